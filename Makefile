@@ -6,7 +6,7 @@ INSTALLED := .venv/.installed
 # One thread per worker in the linear algebra library: two workers share the machine.
 QUIET_THREADS := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 
-.PHONY: run paper test test-slow lint bench clean
+.PHONY: run paper test test-slow lint bench explorer clean
 
 run: $(INSTALLED)
 	$(BIN)/equimorph run examples/arch.toml
@@ -30,9 +30,13 @@ lint: $(INSTALLED)
 bench: $(INSTALLED)
 	$(BIN)/python -m pytest -o addopts="--import-mode=importlib" -p no:xdist --benchmark-only benchmarks
 
+# The program of the explorer's page, for whoever changes it: needs node, which nothing else does.
+explorer:
+	cd explorer && npm ci --no-fund --no-audit && npx tsc && node build.mjs
+
 clean:
 	rm -rf .venv .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis .benchmarks \
-	    results dist
+	    results dist explorer/node_modules
 	find src tests -name __pycache__ -type d -prune -exec rm -rf {} +
 
 $(INSTALLED): pyproject.toml

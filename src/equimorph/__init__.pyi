@@ -7,6 +7,7 @@ from . import (
     dynamics as dynamics,
     equilibria as equilibria,
     errors as errors,
+    explorer as explorer,
     linalg as linalg,
     manifold as manifold,
     model as model,
@@ -80,6 +81,7 @@ from .errors import (
     EquimorphError as EquimorphError,
     InputError as InputError,
 )
+from .explorer import explore as explore
 from .manifold import (
     Audit as Audit,
     Components as Components,

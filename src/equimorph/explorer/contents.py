@@ -1,0 +1,299 @@
+"""What a page holds: states with their pictures and numbers, cells, folds, snaps, routes, barriers.
+
+States of routes, landings of snaps and both sides of barriers stand behind the vertices of the set
+in one list, so that everything that the page shows is a state of that list or lies in a cell.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from jaxtyping import Int, Num
+
+from equimorph.charts import Reduction
+from equimorph.equilibria import Landing
+from equimorph.errors import InputError
+from equimorph.explorer.packing import quantise
+from equimorph.explorer.pictures import gallery
+from equimorph.explorer.study_text import study_text
+from equimorph.manifold import EquilibriumSet, SnapGraph
+from equimorph.model import Descriptor, Disc, Obstacle
+from equimorph.plotting.curves import corner_steps, snap_steps
+from equimorph.plotting.support_symbols import AWAY, SYMBOLS, UPRIGHT
+from equimorph.structures import States, effort_of, margin_of
+from equimorph.tasks import Route
+
+_ROUTE_STATES = 400
+"""States of a route that a page holds."""
+_EXACT = ("stability_margin", "energy")
+"""Scalars of which small differences matter: they are kept as single floats."""
+_AT_ONCE = 8192
+"""States whose scalars are computed together."""
+
+Arrays = dict[str, Num[np.ndarray, "..."]]
+
+
+@dataclass(frozen=True, eq=False)
+class Question:
+    """What is shown on a page."""
+
+    eset: EquilibriumSet
+    routes: Mapping[str, Route]
+    snaps: SnapGraph
+    reduction: Reduction | None
+    descriptors: tuple[Descriptor, ...]
+    title: str
+
+
+def contents(asked: Question) -> tuple[dict[str, Any], Arrays]:
+    """Words and small tables, and the large arrays."""
+    eset = asked.eset
+    extra = _States(eset.points)
+    routes = [_route(eset, name, each, extra) for name, each in asked.routes.items()]
+    runs, snap_arrays = _snaps(asked.snaps, extra)
+    barriers = [] if asked.reduction is None else _barriers(asked.reduction, extra)
+    states = extra.all()
+    shown = gallery(states)
+    scalars, scalar_arrays = _scalars(states, _descriptors(asked))
+    study, why = _study(eset, asked.title)
+    d = len(eset.names)
+    words = {
+        "title": asked.title,
+        "kind": eset.structure.kind,
+        "audit": str(eset.audit),
+        "clean": bool(eset.audit.clean),
+        "unit": eset.structure.length_unit,
+        "upward": eset.structure.upward,
+        "space": shown.space,
+        "size": shown.size,
+        "vertices": len(eset.points),
+        "parameters": _parameters(eset),
+        "fixed": _fixed(eset),
+        "constraints": [str(each) for each in eset.constraints],
+        "obstacles": [_obstacle(each.descriptor.obstacle) for each in eset.constraints
+                      if each.descriptor.obstacle is not None],
+        "scalars": scalars,
+        "elevation": eset.structure.elevation.name,
+        "layout": shown.layout,
+        "fidelity": shown.error,
+        "routes": routes,
+        "runs": runs,
+        "barriers": barriers,
+        "rule": "" if asked.reduction is None else str(asked.reduction.rule),
+        "symbols": _symbols(),
+        "study": study,
+        "no_study": why,
+    }  # fmt: skip
+    arrays: Arrays = {
+        "places": states.p[:, eset.setting.free].astype(np.float32),
+        "index": np.minimum(_index(eset, states), 255).astype(np.uint8),
+        "cells": eset.cells.astype(np.int32),
+        "cell_index": np.minimum(eset.cell_index, 255).astype(np.uint8),
+        "stratum": eset.stratum.astype(np.int32),
+        "component": eset.component.astype(np.int32),
+        "folds": _facets(eset.folds, d),
+        "crossings": _facets(eset.crossings, d),
+        "mean": shown.mean.astype(np.float32),
+        "modes": shown.modes.astype(np.float32),
+        "low": shown.low.astype(np.float32),
+        "step": shown.step.astype(np.float32),
+        "coefficients": shown.coefficients,
+        **snap_arrays,
+        **scalar_arrays,
+    }
+    return words, arrays
+
+
+class _States:
+    """A growing list of states."""
+
+    def __init__(self, first: States) -> None:
+        self._parts = [first]
+        self._count = len(first)
+
+    def add(self, states: States) -> int:
+        """Append states; the number of the first."""
+        first = self._count
+        self._parts.append(states)
+        self._count += len(states)
+        return first
+
+    def all(self) -> States:
+        """Every state, in order."""
+        z, p = (np.concatenate([getattr(each, k) for each in self._parts]) for k in "zp")
+        return States(self._parts[0].structure, z, p)
+
+
+def _index(eset: EquilibriumSet, states: States) -> Int[np.ndarray, " lanes"]:
+    """Index of every state: on folds that of the lower side."""
+    return np.concatenate([eset.index, states[len(eset.points) :].index])
+
+
+def _parameters(eset: EquilibriumSet) -> list[dict[str, Any]]:
+    known = {each.name: each for each in eset.structure.parameters}
+    sides = zip(eset.names, eset.box.lower.tolist(), eset.box.upper.tolist(), strict=True)
+    return [
+        {"name": name, "unit": known[name].unit, "role": str(known[name].role),
+         "lower": low, "upper": high, "scale": float(known[name].scale)}
+        for name, low, high in sides
+    ]  # fmt: skip
+
+
+def _fixed(eset: EquilibriumSet) -> list[dict[str, Any]]:
+    """Values of the parameters that are not free."""
+    columns = zip(eset.structure.parameters, eset.setting.base.tolist(), strict=True)
+    return [
+        {"name": each.name, "unit": each.unit, "value": value}
+        for each, value in columns
+        if each.name not in eset.names
+    ]
+
+
+def _descriptors(asked: Question) -> list[Descriptor]:
+    """The descriptors of the page, each once: heights first, then numbers, then efforts."""
+    structure, eset = asked.eset.structure, asked.eset
+    found = [structure.elevation, *asked.descriptors]
+    found += [each.descriptor for each in eset.constraints]
+    found += [margin_of(structure)]
+    some = eset.points[:1]
+    if structure.index_out_of_plane(some.z, some.p) is not None:
+        found.append(structure.descriptor("lateral_margin"))
+    found.append(structure.descriptor("energy"))
+    moved = [
+        each.name
+        for each in structure.parameters
+        if each.name in eset.names or each.role == "actuator"
+    ]
+    found += [effort_of(structure, name) for name in moved]
+    return list({each.name: each for each in found}.values())
+
+
+def _scalars(
+    states: States, descriptors: Sequence[Descriptor]
+) -> tuple[list[dict[str, Any]], Arrays]:
+    """Name, unit and scale of each descriptor, and its values."""
+    words: list[dict[str, Any]] = []
+    arrays: Arrays = {}
+    for number, each in enumerate(descriptors):
+        values = np.concatenate(
+            [each(states[k : k + _AT_ONCE]) for k in range(0, len(states), _AT_ONCE)]
+        )
+        if each.name == "energy":
+            values = states.energy
+        packed, low, step = quantise(values)
+        exact = each.name in _EXACT
+        arrays[f"scalar{number}"] = np.nan_to_num(values).astype(np.float32) if exact else packed
+        words.append({
+            "name": each.name, "unit": each.unit, "symbol": each.symbol or each.name,
+            "low": 0.0 if exact else low, "step": 1.0 if exact else step,
+        })  # fmt: skip
+    return words, arrays
+
+
+def _facets(pieces: Sequence[Int[np.ndarray, "..."]], d: int) -> Int[np.ndarray, "n d"]:
+    """Facets of folds or crossings: points, edges or triangles."""
+    rows = [
+        np.stack([each[:-1], each[1:]], axis=1) if d == 2 else each.reshape(-1, d)
+        for each in pieces
+    ]
+    return np.concatenate([np.zeros((0, d), int), *rows]).astype(np.int32)
+
+
+def _route(eset: EquilibriumSet, name: str, route: Route, extra: _States) -> dict[str, Any]:
+    """States of a route with its corners and snaps; without states if it has no path."""
+    words: dict[str, Any] = {
+        "name": name, "status": route.status, "why": route.why, "first": 0, "count": 0,
+        "at": [], "corners": [], "snaps": [], "released": [], "margin": None,
+    }  # fmt: skip
+    if route.path is None:
+        return words
+    count = len(route.path.states)
+    corners = [0, count - 1] if route.schedule is None else corner_steps(route).tolist()
+    snaps = snap_steps(route).tolist()
+    kept = np.linspace(0, count - 1, min(count, _ROUTE_STATES)).astype(int)
+    kept = np.unique([*kept, *corners, *snaps, *(k + 1 for k in snaps)])
+    length = route.path.length
+    whole = float(length[-1]) or 1.0
+    place = {int(step): number for number, step in enumerate(kept)}
+    return words | {
+        "first": extra.add(route.path.states[kept]),
+        "count": len(kept),
+        "at": (length[kept] / whole).round(6).tolist(),
+        "corners": [place[int(k)] for k in corners],
+        "snaps": [place[int(k)] for k in snaps],
+        "released": [float(each.released) for each in route.snaps],
+        "margin": float(route.margin) if np.isfinite(route.margin) else None,
+    }
+
+
+def _snaps(graph: SnapGraph, extra: _States) -> tuple[list[dict[str, Any]], Arrays]:
+    """Runs of the stability boundary; for each vertex that was tried the landing and the energy."""
+    runs, vertex, run, landing, released = [], [], [], [], []
+    along: list[Int[np.ndarray, " n"]] = []
+    run_along = []
+    for number, snap in enumerate(graph.snaps):
+        runs.append({"source": snap.source, "target": snap.target, "status": snap.status})
+        along.append(snap.along)
+        run_along.append(np.full(len(snap.along), number))
+        landed = [each for each in snap.landings if each.landed]
+        first = extra.add(_ends(landed, graph.eset.points)) if landed else 0
+        for where, each in zip(snap.vertices.tolist(), snap.landings, strict=True):
+            vertex.append(where)
+            run.append(number)
+            released.append(float(each.released))
+            landing.append(first if each.landed else -1)
+            first += int(each.landed)
+    whole = {
+        "snap_vertex": vertex, "snap_run": run, "snap_landing": landing,
+        "along": np.concatenate([np.zeros(0, int), *along]),
+        "along_run": np.concatenate([np.zeros(0, int), *run_along]),
+    }  # fmt: skip
+    arrays: Arrays = {name: np.asarray(each, dtype=np.int32) for name, each in whole.items()}
+    return runs, arrays | {"snap_released": np.asarray(released, dtype=np.float32)}
+
+
+def _ends(landings: Sequence[Landing], like: States) -> States:
+    z, p = (np.stack([getattr(each.state, k) for each in landings]) for k in "zp")
+    return States(like.structure, z, p)
+
+
+def _barriers(reduction: Reduction, extra: _States) -> list[dict[str, Any]]:
+    """Both sides of each barrier, where the sides are known."""
+    return [
+        {"kind": each.kind, "near": extra.add(each.near), "far": extra.add(each.far),
+         "count": min(len(each.near), len(each.far)), "facets": each.facets.tolist()}
+        for each in reduction.barriers
+        if len(each.near) and len(each.near) == len(each.far)
+    ]  # fmt: skip
+
+
+def _obstacle(obstacle: Obstacle | None) -> dict[str, Any]:
+    if isinstance(obstacle, Disc):
+        return {"centre": list(obstacle.centre), "radius": float(obstacle.radius),
+                "inside": obstacle.inside}  # fmt: skip
+    assert obstacle is not None
+    return {"point": list(obstacle.point), "normal": list(obstacle.normal)}
+
+
+def _symbols() -> dict[str, Any]:
+    """Symbols of supports, as the figures draw them."""
+    return {
+        str(kind): {
+            "upright": kind in UPRIGHT,
+            "away": kind in AWAY,
+            "strokes": [
+                {"outline": each.outline.round(4).tolist(), "filled": each.filled}
+                for each in strokes
+            ],
+        }
+        for kind, strokes in SYMBOLS.items()
+    }
+
+
+def _study(eset: EquilibriumSet, title: str) -> tuple[str, str]:
+    """Beginning of a study file, or why there is none."""
+    try:
+        return study_text(eset, title), ""
+    except InputError as error:
+        return "", str(error)

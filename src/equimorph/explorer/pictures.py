@@ -1,0 +1,204 @@
+"""Pictures of many states as mean + coefficients · modes, which works for every structure.
+
+A picture is everything that a structure says of itself to draw, as one list of numbers: the points
+of its shape, places and directions of supports, forces, couples and actuators, all as lengths in
+the drawing. Over a set of at most three dimensions a few dozen modes (principal components) give
+all pictures within `FIDELITY`.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from equimorph.arrays import Values
+from equimorph.explorer.packing import TOP
+from equimorph.model import Couples, Drawing, Forces
+from equimorph.structures import States
+
+FIDELITY = 2e-4
+"""Largest error of a point of a picture at a vertex, as a share of the size of the structure."""
+_STEP = 3e-5
+"""Step of the coefficients, as a share of the size; rounding adds about twice this."""
+_SAMPLE, _WORST, _ROUNDS = 1500, 300, 4
+"""Pictures from which modes are computed, the worst ones that are added, and how often."""
+_AT_ONCE = 8192
+"""Pictures in memory at once."""
+_MODES_AT_ONCE = 4
+"""Modes between two looks at the error."""
+_DIRECTION, _LINE_LOAD, _FORCE, _COUPLE = 0.05, 0.09, 0.15, 0.06
+"""Lengths of unit directions, of the longest arrows of line loads and forces, and of the largest
+couple in a picture, as shares of the size of the structure."""
+_RIBBON = 0.02
+"""Half the width of a drawn strip, as a share of the size of the structure."""
+
+Pictures = Float[np.ndarray, "lanes numbers"]
+Rows = Float[np.ndarray, "modes numbers"]
+
+
+@dataclass(frozen=True)
+class Scales:
+    """Size of the structure, and what arrows are compared with.
+
+    size: larger side of the box around the shapes; line_load, force, couple: the largest ones.
+    """
+
+    size: float
+    line_load: float
+    force: float
+    couple: float
+
+    def of_forces(self, forces: Forces) -> float:
+        """Length of an arrow per force."""
+        most = self.line_load if forces.distributed else self.force
+        longest = _LINE_LOAD if forces.distributed else _FORCE
+        return longest * self.size / most if most > 0.0 else 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Gallery:
+    """Pictures of all states, packed.
+
+    Parameters
+    ----------
+    layout
+        Parts of a picture in the order of its numbers, as plain data for the page.
+    space
+        2 or 3: coordinates of a point.
+    size
+        Size of the structure in its unit of length.
+    mean, modes
+        Numbers of the mean picture, and of the modes; the largest number of a mode is 1.
+    low, step
+        Lowest coefficient of each mode, and the value of one step.
+    coefficients
+        Steps above the lowest.
+    error
+        Largest error of a number of a picture without rounding, as a share of the size.
+    """
+
+    layout: list[dict[str, Any]]
+    space: int
+    size: float
+    mean: Float[np.ndarray, " numbers"]
+    modes: Rows
+    low: Float[np.ndarray, " modes"]
+    step: Float[np.ndarray, " modes"]
+    coefficients: Int[np.ndarray, "lanes modes"]
+    error: float
+
+
+def gallery(states: States) -> Gallery:
+    """Pictures of states, at least one, within `FIDELITY`.
+
+    Modes come from a sample; the pictures that they give worst are added to it, a few times.
+    """
+    scales = _scales(states)
+    layout = _picture(states[:1], scales)[1]
+    chosen = np.unique(np.linspace(0, len(states) - 1, _SAMPLE).astype(int))
+    for _ in range(_ROUNDS):
+        sample = _picture(states[chosen], scales)[0]
+        mean = sample.mean(axis=0)
+        modes = _modes(sample - mean, 0.5 * FIDELITY * scales.size)
+        parts = [_project(whole - mean, modes) for whole in _all(states, scales)]
+        errors = np.concatenate([error for _, error in parts]) / scales.size
+        worst = np.argsort(errors)[-_WORST:]
+        if errors.max() <= FIDELITY or np.isin(worst, chosen).all():
+            break
+        chosen = np.unique(np.concatenate([chosen, worst]))
+    coefficients = np.concatenate([each for each, _ in parts])
+    low = coefficients.min(axis=0)
+    step = np.maximum(_STEP * scales.size, np.ptp(coefficients, axis=0) / TOP)
+    whole = np.round((coefficients - low) / step).astype(np.uint16)
+    space = states[:1].shape().shape[2]
+    return Gallery(layout, space, scales.size, mean, modes, low, step, whole, float(errors.max()))
+
+
+def _all(states: States, scales: Scales) -> Iterator[Pictures]:
+    for first in range(0, len(states), _AT_ONCE):
+        yield _picture(states[first : first + _AT_ONCE], scales)[0]
+
+
+def _modes(centred: Pictures, tolerance: float) -> Rows:
+    """As few principal components as give all pictures within a tolerance, largest number 1."""
+    _, _, rows = np.linalg.svd(centred, full_matrices=False)
+    rest, count = centred.copy(), 0
+    while count < len(rows) and np.abs(rest).max(initial=0.0) > tolerance:
+        some = rows[count : count + _MODES_AT_ONCE]
+        rest -= (rest @ some.T) @ some
+        count += len(some)
+    kept = rows[: max(count, 1)]
+    return np.asarray(kept / np.abs(kept).max(axis=1, keepdims=True))
+
+
+def _project(centred: Pictures, modes: Rows) -> tuple[Pictures, Values]:
+    """Coefficients of pictures, and the largest error of each."""
+    found = centred @ modes.T / (modes**2).sum(axis=1)
+    return found, np.abs(centred - found @ modes).max(axis=1)
+
+
+def _scales(states: States) -> Scales:
+    """What lengths in pictures refer to, from a sample of the states."""
+    some = states[np.unique(np.linspace(0, len(states) - 1, _SAMPLE).astype(int))]
+    shape, drawing = some.shape(), some.drawing()
+    size = float(np.ptp(shape, axis=1).max()) or 1.0
+    most = {
+        distributed: max(
+            (
+                float(np.linalg.norm(each.vectors, axis=2).max(initial=0.0))
+                for each in drawing.forces
+                if each.distributed == distributed
+            ),
+            default=0.0,
+        )
+        for distributed in (True, False)
+    }
+    couple = max((float(np.abs(each.moments).max(initial=0.0)) for each in drawing.couples),
+                 default=0.0)  # fmt: skip
+    return Scales(size, most[True], most[False], couple)
+
+
+def _picture(states: States, scales: Scales) -> tuple[Pictures, list[dict[str, Any]]]:
+    """Pictures of a batch, and their layout."""
+    shape, drawing = states.shape(), states.drawing()
+    pieces: list[tuple[dict[str, Any], Float[np.ndarray, "lanes ..."]]] = [
+        ({"what": "line", "points": shape.shape[1]}, shape)
+    ]
+    frames = states.frames() if states.structure.flatness > 1.0 else None
+    if frames is not None:
+        part = {"what": "ribbon", "points": shape.shape[1]}
+        pieces.append((part, _RIBBON * scales.size * frames[..., 2]))
+    pieces += _surroundings(drawing, scales)
+    flat = [array.reshape(len(states), -1) for _, array in pieces]
+    return np.concatenate(flat, axis=1), [part for part, _ in pieces]
+
+
+def _surroundings(
+    drawing: Drawing, scales: Scales
+) -> list[tuple[dict[str, Any], Float[np.ndarray, "lanes ..."]]]:
+    """Supports, forces, couples and actuators with their numbers."""
+    pieces: list[tuple[dict[str, Any], Float[np.ndarray, "lanes ..."]]] = []
+    for support in drawing.supports:
+        both = np.stack([support.places, _DIRECTION * scales.size * support.directions], axis=1)
+        pieces.append(({"what": "support", "kind": str(support.kind)}, both))
+    for forces in drawing.forces:
+        both = np.concatenate([forces.places, scales.of_forces(forces) * forces.vectors], axis=1)
+        count = forces.places.shape[1]
+        part = {"what": "forces", "distributed": forces.distributed, "points": count}
+        pieces.append((part, both))
+    pieces += [_couples(couples, scales) for couples in drawing.couples]
+    for each in drawing.actuators:
+        part = {"what": "actuator", "kind": str(each.kind), "points": each.line.shape[1]}
+        pieces.append((part, each.line))
+    return pieces
+
+
+def _couples(
+    couples: Couples, scales: Scales
+) -> tuple[dict[str, Any], Float[np.ndarray, "lanes numbers"]]:
+    length = _COUPLE * scales.size / scales.couple if scales.couple > 0.0 else 0.0
+    lanes, count = couples.moments.shape
+    numbers = [couples.places.reshape(lanes, -1), length * couples.moments]
+    return {"what": "couples", "points": count}, np.concatenate(numbers, axis=1)

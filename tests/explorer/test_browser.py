@@ -1,0 +1,236 @@
+"""Pages in a browser: they open from the disk, and are used as a person would use them."""
+
+import tomllib
+from itertools import pairwise
+
+import equimorph as em
+import numpy as np
+import pytest
+
+FOLD_F, FOLD_X = 0.0, 0.8
+"""Load and place of A from which the spring is led to its fold."""
+STATE = (
+    "(() => { const e = explorer, p = e.set.parameters(e.spot);"
+    " return {p, index: e.set.indexOf(e.spot), end: e.end, angle: e.set.scalar(e.set.named('angle'), e.spot)}; })()"
+)
+
+
+def _fold_load(x):
+    """Closed form: F/k = (1 − x^⅔)^{3/2}."""
+    return (1.0 - x ** (2.0 / 3.0)) ** 1.5
+
+
+@pytest.fixture
+def spring(opened, spring_page):
+    return opened(spring_page)
+
+
+def _focus(page):
+    page.page.focus(".view-box")
+
+
+def test_a_page_opens_without_asking_for_anything(spring):
+    """One request: the file itself. The title is text, whatever stands in it."""
+    assert [url[:5] for url in spring.requests] == ["file:"]
+    assert spring.page.title() == "Spring </script><b>&amp;"
+    assert spring("document.querySelector('h1').textContent") == "Spring </script><b>&amp;"
+    assert spring("document.querySelector('h1').children.length") == 0
+
+
+def test_states_of_the_page_are_those_of_the_closed_form(spring):
+    """F = k (1 − x_l/cos δ) sin δ at interpolated states, and their margins' signs."""
+    found = spring(
+        """() => explorer.set.over([0.8, 0.05]).map((spot) => ({index: explorer.set.indexOf(spot),
+        angle: explorer.set.scalar(explorer.set.named('angle'), spot)}))"""
+    )
+    assert sorted(each["index"] for each in found) == [0, 0, 1]
+    for each in found:
+        d = each["angle"]
+        assert (1.0 - 0.8 / np.cos(d)) * np.sin(d) == pytest.approx(0.05, abs=3e-3)
+
+
+def test_a_drag_stops_at_the_fold_and_shows_the_landing(spring):
+    """The spring at x_l = 0.8 loses its stability at F = (1 − 0.8^⅔)^{3/2}.
+
+    The tolerance is half a cell of the grid. The energy is released, and following the snap leads
+    to the other side.
+    """
+    page = spring
+    page(f"explorer.goToPoint([{FOLD_X}, {FOLD_F}])")
+    page(
+        "() => { while (explorer.set.scalar(explorer.set.named('angle'), explorer.spot) < 0.1 || explorer.set.indexOf(explorer.spot)) explorer.next(); }"
+    )
+    page("explorer.view.draw()")
+    start = page(STATE)
+    x, y = page("explorer.view.project(explorer.view.position(explorer.spot))")
+    box = page.page.locator(".view").bounding_box()
+    towards = page(
+        "(() => { const e = explorer, v = e.view; const s = e.set.walk(e.spot, [0.8, 0.05]).spot; return v.project(v.position(s)); })()"
+    )
+    mouse = page.page.mouse
+    mouse.move(box["x"] + x, box["y"] + y)
+    mouse.down()
+    for k in range(1, 25):
+        mouse.move(box["x"] + x + k * (towards[0] - x), box["y"] + y + k * (towards[1] - y))
+    mouse.up()
+    found = page(STATE)
+    assert start["index"] == found["index"] == 0
+    assert found["end"] == "fold"
+    assert abs(found["p"][1]) == pytest.approx(_fold_load(found["p"][0]), abs=0.6 / 24)
+    landing = page(
+        "({released: explorer.landing.released, angle: explorer.set.scalar(explorer.set.named('angle'), explorer.landing.spot)})"
+    )
+    assert landing["released"] > 0.0
+    assert landing["angle"] * found["angle"] < 0.0
+    assert "releases" in page.page.inner_text(".says")
+    page.page.click("text=Follow the snap")
+    assert page(STATE)["angle"] == pytest.approx(landing["angle"])
+
+
+def test_all_is_done_by_keys(spring):
+    """Walk, turn, look from above, next equilibrium, pin, remove, play, lead a way, help."""
+    page = spring
+    page("explorer.goToPoint([1.2, 0.1])")
+    _focus(page)
+    press = page.page.keyboard.press
+    before = page(STATE)["p"]
+    press("ArrowRight")
+    press("ArrowUp")
+    after = page(STATE)["p"]
+    assert after == pytest.approx([before[0] + 0.01, before[1] + 0.006], abs=1e-6)
+    camera = page("explorer.view.cameraText")
+    press("Shift+ArrowLeft")
+    assert page("explorer.view.cameraText") != camera
+    press("v")
+    press("+")
+    press("Enter")
+    assert page("explorer.pins.length") == 2
+    press("Delete")
+    assert page("explorer.pins.length") == 1
+    page("explorer.goToPoint([0.8, 0.02])")
+    _focus(page)
+    angle = page(STATE)["angle"]
+    press("n")
+    assert page(STATE)["angle"] != pytest.approx(angle)
+    page("explorer.goToPoint([1.2, 0.1])")
+    _focus(page)
+    press("w")
+    press("ArrowLeft")
+    press("w")
+    assert page("explorer.way.legs.length") == 1
+    press("Space")
+    page.page.wait_for_function("explorer.player.at > 0")
+    press("Space")
+    press("?")
+    assert page.page.is_visible("dialog")
+    press("Escape")
+    assert not page.page.is_visible("dialog")
+
+
+def test_every_control_has_a_name_and_can_be_reached(spring):
+    """Buttons, fields and the set itself are named, and the tab key meets all of them."""
+    nameless = spring(
+        """() => [...document.querySelectorAll('button, select, input, [role=application], svg[role=img]')].filter((e) =>
+        !(e.getAttribute('aria-label') || e.textContent.trim() || e.labels?.[0]?.textContent.trim())).map((e) => e.outerHTML)"""
+    )
+    assert nameless == []
+    wanted = spring(
+        "() => [...document.querySelectorAll('main button, main select, main input')].filter((e) => !e.disabled && e.offsetParent).length"
+    )
+    spring("document.activeElement.blur()")
+    seen = set()
+    for _ in range(wanted + 4):
+        spring.page.keyboard.press("Tab")
+        seen.add(
+            spring(
+                "() => { const e = document.activeElement; e.dataset.seen ??= String(Math.random()); return e.dataset.seen; }"
+            )
+        )
+    assert len(seen) >= wanted
+    assert spring("document.querySelector('.says').getAttribute('aria-live')") == "polite"
+
+
+def test_a_state_in_the_address_comes_back(opened, spring_page, spring):
+    """Pins, colour, place on the route and theme."""
+    spring("explorer.goToPoint([0.8, 0.05])")
+    spring("explorer.setColour(explorer.set.named('energy'))")
+    spring("explorer.player.move(0.25)")
+    spring("explorer.switchTheme()")
+    fragment = spring("'#' + explorer.linkText")
+    again = opened(spring_page, fragment)
+    assert again(STATE)["p"] == pytest.approx(spring(STATE)["p"], abs=1e-6)
+    assert again(STATE)["angle"] == pytest.approx(spring(STATE)["angle"], abs=1e-6)
+    assert again("explorer.linkText") == fragment[1:]
+
+
+def test_a_drawn_way_is_exported_as_a_sound_study(spring, tmp_path):
+    """The file is a study whose route Python certifies, along the way-points of the page."""
+    page = spring
+    page("explorer.goToPoint([0.8, 0.009908])")
+    page(
+        "() => { while (explorer.set.scalar(explorer.set.named('angle'), explorer.spot) < 0.1 || explorer.set.indexOf(explorer.spot)) explorer.next(); }"
+    )
+    page("explorer.beginWay()")
+    for target in ([1.2, 0.0], [1.2, -0.02], [0.8, -0.009908]):
+        page("(p) => explorer.leadWay(p)", target)
+    assert page.page.inner_text(".way .verdict").startswith("Coarse:")
+    with page.page.expect_download() as download:
+        page.page.click("text=Export study")
+    file = tmp_path / "drawn.toml"
+    download.value.save_as(file)
+    text = tomllib.loads(file.read_text(encoding="utf-8"))
+    assert len(text["route"][0]["via"]) == 3
+    em.study.check_study(file) if hasattr(em.study, "check_study") else em.study.read_problem(file)
+    outcome = em.study.run_study(file, tmp_path / "out")
+    assert not outcome.refused
+    assert outcome.of("route")["drawn"][0].arrived
+
+
+def test_a_way_over_a_fold_is_called_blocked(spring):
+    """A coarse verdict names the obstacle and its place."""
+    page = spring
+    page("explorer.goToPoint([0.8, 0.0])")
+    page("() => { while (explorer.set.indexOf(explorer.spot)) explorer.next(); }")
+    page("explorer.beginWay()")
+    sign = 1 if page(STATE)["angle"] < 0 else -1
+    page("(p) => explorer.leadWay(p)", [0.8, 0.2 * -sign])
+    ends = [page("explorer.way.legs[0].end")]
+    if ends[0] != "fold":
+        page("() => { explorer.way.remove(); }")
+        page("(p) => explorer.leadWay(p)", [0.8, 0.2 * sign])
+        ends.append(page("explorer.way.legs[0].end"))
+    assert "fold" in ends
+    assert "fold" in page.page.inner_text(".way .verdict")
+
+
+@pytest.mark.parametrize("width", [390, 1200])
+def test_nothing_is_wider_than_the_window(opened, spring_page, width):
+    page = opened(spring_page, viewport={"width": width, "height": 800})
+    assert page("document.documentElement.scrollWidth") <= width
+
+
+def test_a_tap_pins_a_state(opened, spring_page):
+    """On a phone."""
+    page = opened(spring_page, viewport={"width": 390, "height": 800}, has_touch=True)
+    box = page.page.locator(".view").bounding_box()
+    page("explorer.lookAbove(true)")
+    page("explorer.view.draw()")
+    before = page("explorer.pins.length")
+    x, y = page("explorer.view.project(explorer.view.position(explorer.set.over([1.2, 0.1])[0]))")
+    page.page.touchscreen.tap(box["x"] + x, box["y"] + y)
+    assert page("explorer.pins.length") == before + 1
+    assert page(STATE)["p"] == pytest.approx([1.2, 0.1], abs=0.02)
+
+
+def test_strips_and_progress_go_in_step(spring):
+    """Progress along the route is even in its length."""
+    shares = spring("explorer.player.route.at")
+    assert shares[0] == 0.0
+    assert shares[-1] == pytest.approx(1.0)
+    assert all(a <= b for a, b in pairwise(shares))
+    spring("explorer.player.move(0.5)")
+    margin = float(spring.page.inner_text(".strips figure:first-child output").replace("−", "-"))
+    exact = spring(
+        "explorer.set.scalar(explorer.set.named('stability_margin'), explorer.player.spot)"
+    )
+    assert margin == pytest.approx(exact, rel=1e-3)
