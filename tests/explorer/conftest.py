@@ -5,13 +5,14 @@ from pathlib import Path
 from shutil import which
 from typing import Any
 
-import equimorph as em
 import pytest
+
+import equimorph as em
+from webpages import Opened
 
 CHROMIUM = which("chromium") or which("chromium-browser") or which("google-chrome")
 SOFTWARE = ["--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
 """Drawing in 3-D without a graphics processor."""
-READY = "document.documentElement.dataset.ready || document.documentElement.dataset.failed"
 
 
 @pytest.fixture(scope="session")
@@ -24,28 +25,6 @@ def browser() -> Iterator[Any]:
         running = play.chromium.launch(executable_path=CHROMIUM, args=[*SOFTWARE, "--no-sandbox"])
         yield running
         running.close()
-
-
-class Opened:
-    """A page that was opened from the disk without a network, with what went wrong in it."""
-
-    def __init__(self, browser: Any, path: Path, fragment: str = "", **context: Any) -> None:
-        self.context = browser.new_context(
-            **{"viewport": {"width": 1200, "height": 800}, "accept_downloads": True} | context
-        )
-        self.page = self.context.new_page()
-        self.requests: list[str] = []
-        self.errors: list[str] = []
-        self.page.on("request", lambda request: self.requests.append(request.url))
-        self.page.on("pageerror", lambda error: self.errors.append(str(error)))
-        self.page.on("console", lambda m: self.errors.append(m.text) if m.type == "error" else None)
-        self.page.goto(path.as_uri() + fragment)
-        self.page.wait_for_function(READY, timeout=120_000)
-        assert self.page.evaluate("document.documentElement.dataset.failed ?? ''") == ""
-
-    def __call__(self, script: str, argument: Any = None) -> Any:
-        """Result of a script in the page; `explorer` is the running program."""
-        return self.page.evaluate(script, argument)
 
 
 @pytest.fixture

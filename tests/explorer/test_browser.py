@@ -3,16 +3,35 @@
 import tomllib
 from itertools import pairwise
 
-import equimorph as em
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
-FOLD_F, FOLD_X = 0.0, 0.8
-"""Load and place of A from which the spring is led to its fold."""
-STATE = (
-    "(() => { const e = explorer, p = e.set.parameters(e.spot);"
-    " return {p, index: e.set.indexOf(e.spot), end: e.end, angle: e.set.scalar(e.set.named('angle'), e.spot)}; })()"
-)
+import equimorph as em
+from equimorph.cli.app import app
+from webpages import Opened
+
+STATE = """(() => { const {set, spot, end} = explorer; return {p: set.parameters(spot), end,
+index: set.indexOf(spot), angle: set.scalar(set.named('angle'), spot)}; })()"""
+LANDING = """(() => { const {set, landing} = explorer; return {released: landing.released,
+angle: set.scalar(set.named('angle'), landing.spot)}; })()"""
+TOWARDS = """(() => { const {set, view, spot} = explorer;
+return view.project(view.position(set.walk(spot, [0.8, 0.05]).spot)); })()"""
+"""Pixels of the state to which the load is a little larger."""
+NAMELESS = """() => [...document.querySelectorAll(
+'button, select, input, [role=application], svg[role=img]')].filter((e) =>
+!(e.getAttribute('aria-label') || e.textContent.trim() || e.labels?.[0]?.textContent.trim())
+).map((e) => e.outerHTML)"""
+REACHED = """() => { const e = document.activeElement; e.dataset.seen ??= String(Math.random());
+return e.dataset.seen; }"""
+CONTROLS = """() => [...document.querySelectorAll('main button, main select, main input')].filter(
+(e) => !e.disabled && e.offsetParent).length"""
+UPPER = """() => { const e = explorer; while (e.set.scalar(e.set.named('angle'), e.spot) < 0.1
+|| e.set.indexOf(e.spot)) e.next(); }"""
+"""Choose the stable state with the larger angle."""
+WAIT = """() => new Promise((done) => { const look = () => explorer.player.at > 0 ? done() :
+requestAnimationFrame(look); look(); })"""
+"""Until the route plays."""
 
 
 def _fold_load(x):
@@ -20,9 +39,23 @@ def _fold_load(x):
     return (1.0 - x ** (2.0 / 3.0)) ** 1.5
 
 
+@pytest.fixture(scope="module")
+def spring_once(browser, spring_page):
+    page = Opened(browser, spring_page)
+    yield page
+    page.context.close()
+
+
 @pytest.fixture
-def spring(opened, spring_page):
-    return opened(spring_page)
+def spring(spring_once):
+    """One page for all tests, with one pin, no way, and the route at its start."""
+    page = spring_once
+    page(
+        """() => { const e = explorer; document.querySelector('dialog').close(); e.way = null;
+        while (e.pins.length > 1) e.unpin(0); e.player.move(0); e.lookAbove(false); }"""
+    )
+    yield page
+    assert not page.errors
 
 
 def _focus(page):
@@ -56,30 +89,24 @@ def test_a_drag_stops_at_the_fold_and_shows_the_landing(spring):
     to the other side.
     """
     page = spring
-    page(f"explorer.goToPoint([{FOLD_X}, {FOLD_F}])")
-    page(
-        "() => { while (explorer.set.scalar(explorer.set.named('angle'), explorer.spot) < 0.1 || explorer.set.indexOf(explorer.spot)) explorer.next(); }"
-    )
+    page("explorer.goToPoint([0.8, 0.0])")
+    page(UPPER)
     page("explorer.view.draw()")
     start = page(STATE)
     x, y = page("explorer.view.project(explorer.view.position(explorer.spot))")
     box = page.page.locator(".view").bounding_box()
-    towards = page(
-        "(() => { const e = explorer, v = e.view; const s = e.set.walk(e.spot, [0.8, 0.05]).spot; return v.project(v.position(s)); })()"
-    )
+    towards = page(TOWARDS)
     mouse = page.page.mouse
     mouse.move(box["x"] + x, box["y"] + y)
     mouse.down()
-    for k in range(1, 25):
+    for k in range(2, 25, 3):
         mouse.move(box["x"] + x + k * (towards[0] - x), box["y"] + y + k * (towards[1] - y))
     mouse.up()
     found = page(STATE)
     assert start["index"] == found["index"] == 0
     assert found["end"] == "fold"
     assert abs(found["p"][1]) == pytest.approx(_fold_load(found["p"][0]), abs=0.6 / 24)
-    landing = page(
-        "({released: explorer.landing.released, angle: explorer.set.scalar(explorer.set.named('angle'), explorer.landing.spot)})"
-    )
+    landing = page(LANDING)
     assert landing["released"] > 0.0
     assert landing["angle"] * found["angle"] < 0.0
     assert "releases" in page.page.inner_text(".says")
@@ -119,7 +146,7 @@ def test_all_is_done_by_keys(spring):
     press("w")
     assert page("explorer.way.legs.length") == 1
     press("Space")
-    page.page.wait_for_function("explorer.player.at > 0")
+    page(WAIT)
     press("Space")
     press("?")
     assert page.page.is_visible("dialog")
@@ -129,23 +156,14 @@ def test_all_is_done_by_keys(spring):
 
 def test_every_control_has_a_name_and_can_be_reached(spring):
     """Buttons, fields and the set itself are named, and the tab key meets all of them."""
-    nameless = spring(
-        """() => [...document.querySelectorAll('button, select, input, [role=application], svg[role=img]')].filter((e) =>
-        !(e.getAttribute('aria-label') || e.textContent.trim() || e.labels?.[0]?.textContent.trim())).map((e) => e.outerHTML)"""
-    )
+    nameless = spring(NAMELESS)
     assert nameless == []
-    wanted = spring(
-        "() => [...document.querySelectorAll('main button, main select, main input')].filter((e) => !e.disabled && e.offsetParent).length"
-    )
+    wanted = spring(CONTROLS)
     spring("document.activeElement.blur()")
     seen = set()
     for _ in range(wanted + 4):
         spring.page.keyboard.press("Tab")
-        seen.add(
-            spring(
-                "() => { const e = document.activeElement; e.dataset.seen ??= String(Math.random()); return e.dataset.seen; }"
-            )
-        )
+        seen.add(spring(REACHED))
     assert len(seen) >= wanted
     assert spring("document.querySelector('.says').getAttribute('aria-live')") == "polite"
 
@@ -163,27 +181,44 @@ def test_a_state_in_the_address_comes_back(opened, spring_page, spring):
     assert again("explorer.linkText") == fragment[1:]
 
 
-def test_a_drawn_way_is_exported_as_a_sound_study(spring, tmp_path):
-    """The file is a study whose route Python certifies, along the way-points of the page."""
-    page = spring
+AROUND = ([0.8, -0.02], [1.2, -0.05], [1.2, 0.05], [0.8, 0.02], [0.8, -0.009908])
+"""Way-points around the cusp at x_l = 1."""
+
+
+def _export(page, file):
+    """Lead the spring around its cusp, and save the study that the page writes."""
     page("explorer.goToPoint([0.8, 0.009908])")
-    page(
-        "() => { while (explorer.set.scalar(explorer.set.named('angle'), explorer.spot) < 0.1 || explorer.set.indexOf(explorer.spot)) explorer.next(); }"
-    )
+    page(UPPER)
     page("explorer.beginWay()")
-    for target in ([1.2, 0.0], [1.2, -0.02], [0.8, -0.009908]):
+    for target in AROUND:
         page("(p) => explorer.leadWay(p)", target)
-    assert page.page.inner_text(".way .verdict").startswith("Coarse:")
+    verdict = page.page.inner_text(".way .verdict")
     with page.page.expect_download() as download:
         page.page.click("text=Export study")
-    file = tmp_path / "drawn.toml"
     download.value.save_as(file)
+    return verdict
+
+
+def test_a_drawn_way_is_exported_as_a_sound_study(spring, tmp_path):
+    """`equimorph check` accepts the file; its way-points are those of the page."""
+    file = tmp_path / "drawn.toml"
+    verdict = _export(spring, file)
+    assert verdict.startswith("Coarse: Stable")
     text = tomllib.loads(file.read_text(encoding="utf-8"))
-    assert len(text["route"][0]["via"]) == 3
-    em.study.check_study(file) if hasattr(em.study, "check_study") else em.study.read_problem(file)
+    assert [list(each.values()) for each in text["route"][0]["via"]] == list(map(list, AROUND))
+    done = CliRunner().invoke(app, ["check", str(file)])
+    assert done.exit_code == 0, done.output
+
+
+@pytest.mark.slow
+def test_python_certifies_the_way_that_was_drawn(spring, tmp_path):
+    """The exported route arrives, and the same steps are verified without the set."""
+    file = tmp_path / "drawn.toml"
+    _export(spring, file)
     outcome = em.study.run_study(file, tmp_path / "out")
     assert not outcome.refused
     assert outcome.of("route")["drawn"][0].arrived
+    assert outcome.of("verify")["check"].verified
 
 
 def test_a_way_over_a_fold_is_called_blocked(spring):

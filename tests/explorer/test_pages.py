@@ -7,9 +7,10 @@ import tomllib
 import zlib
 from dataclasses import replace
 
-import equimorph as em
 import numpy as np
 import pytest
+
+import equimorph as em
 from equimorph.explorer.packing import json_in_html, pack, quantise
 from equimorph.explorer.pictures import FIDELITY, gallery
 from equimorph.explorer.study_text import study_text, toml
@@ -114,8 +115,8 @@ def test_what_cannot_be_shown_is_refused_in_one_line(spring_set, tmp_path):
         em.explore(spring_set, path=tmp_path / "page.html", route="around")
     with pytest.raises(em.InputError):
         em.explore(spring_set, path=tmp_path / "no" / "page.html")
+    other = em.SnapGraph(replace(spring_set), (), ())
     with pytest.raises(em.InputError, match="must be of `eset`"):
-        other = em.SnapGraph(replace(spring_set), (), ())
         em.explore(spring_set, path=tmp_path / "p.html", snaps=other)
     rod = em.Rod(load="uniform")
     with pytest.raises(em.InputError, match="must describe the structure Spring"):

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float, UInt16
 
 from equimorph.arrays import Values
 from equimorph.explorer.packing import TOP
@@ -36,6 +36,7 @@ _RIBBON = 0.02
 
 Pictures = Float[np.ndarray, "lanes numbers"]
 Rows = Float[np.ndarray, "modes numbers"]
+Coefficients = Float[np.ndarray, "lanes modes"]
 
 
 @dataclass(frozen=True)
@@ -86,7 +87,7 @@ class Gallery:
     modes: Rows
     low: Float[np.ndarray, " modes"]
     step: Float[np.ndarray, " modes"]
-    coefficients: Int[np.ndarray, "lanes modes"]
+    coefficients: UInt16[np.ndarray, "lanes modes"]
     error: float
 
 
@@ -133,7 +134,7 @@ def _modes(centred: Pictures, tolerance: float) -> Rows:
     return np.asarray(kept / np.abs(kept).max(axis=1, keepdims=True))
 
 
-def _project(centred: Pictures, modes: Rows) -> tuple[Pictures, Values]:
+def _project(centred: Pictures, modes: Rows) -> tuple[Coefficients, Values]:
     """Coefficients of pictures, and the largest error of each."""
     found = centred @ modes.T / (modes**2).sum(axis=1)
     return found, np.abs(centred - found @ modes).max(axis=1)
