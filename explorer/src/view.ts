@@ -85,6 +85,7 @@ export class View {
     this.controls.target.set(0, set.d === 1 ? TALL / 2 : 0.36, 0);
     this.controls.enableDamping = false;
     if (set.d === 1) this.controls.enableRotate = false;
+    this.controls.update();
     this.controls.addEventListener("change", () => this.request());
     const sun = new DirectionalLight(0xffffff, 1);
     this.scene.add(new AmbientLight(0xffffff, 1), sun);
@@ -157,7 +158,7 @@ export class View {
       group.push(simplices[3 * t], simplices[3 * t + 1], simplices[3 * t + 2]);
     }
     const position = new BufferAttribute(this.positions, 3);
-    const normal = new BufferAttribute(normals(this.positions, simplices), 3);
+    const normal = new BufferAttribute(normals(this.positions, simplices, (i) => set.cellIndex[cell[i]] % 2 === 1), 3);
     for (const [index, corners] of groups) {
       const geometry = new BufferGeometry();
       geometry.setAttribute("position", position);
@@ -307,24 +308,29 @@ export class View {
     const eye = this.camera.position, front = eye.z >= 0 ? z : -z, right = eye.x >= 0 ? x : -x;
     const above = set.d > 1 && eye.y > 3.5 * Math.hypot(eye.x, eye.z);
     const [one, two] = set.words.parameters;
-    this.axis(one.name, one.unit, one.lower, one.upper, (t) => [(t - 0.5) * SIDES[0], 0, front], [0, set.d === 1 ? 1 : 0.6]);
-    if (two) this.axis(two.name, two.unit, two.lower, two.upper, (t) => [right, 0, (0.5 - t) * SIDES[1]], [right * eye.z > 0 ? 1 : -1, 0.35]);
+    this.axis(one.name, one.unit, one.lower, one.upper, (t) => [(t - 0.5) * SIDES[0], 0, front]);
+    if (two) this.axis(two.name, two.unit, two.lower, two.upper, (t) => [right, 0, (0.5 - t) * SIDES[1]]);
     if (above) return;
     const scalar = set.words.scalars[this.height];
     const edges = set.d === 1 ? [[-x, 0]] : [[-x, -z], [x, -z], [x, z], [-x, z]];
     const [cx, cz] = edges.reduce((best, each) => this.project([each[0], 0, each[1]])[0] < this.project([best[0], 0, best[1]])[0] ? each : best);
-    this.axis(scalar.symbol, scalar.unit, this.low, this.high, (t) => [cx, t * TALL, cz], [-1, 0]);
+    this.axis(scalar.symbol, scalar.unit, this.low, this.high, (t) => [cx, t * TALL, cz]);
   }
 
-  private axis(name: string, unit: string, low: number, high: number, at: (share: number) => [number, number, number], away: [number, number]): void {
+  /** Ticks and name of an axis, on the side of its edge that is away from the middle of the box. */
+  private axis(name: string, unit: string, low: number, high: number, at: (share: number) => [number, number, number]): void {
     const start = this.project(at(0)), end = this.project(at(1)), long = Math.hypot(end[0] - start[0], end[1] - start[1]);
     if (long < 60) return;
+    const middle = this.project([0, TALL / 2, 0]), half = this.project(at(0.5));
+    let away = [(end[1] - start[1]) / long, (start[0] - end[0]) / long];
+    if (away[0] * (half[0] - middle[0]) + away[1] * (half[1] - middle[1]) < 0) away = [-away[0], -away[1]];
     for (const tick of ticks(low, high, Math.max(2, Math.min(6, Math.floor(long / 55))))) {
       const [px, py] = this.project(at((tick - low) / (high - low)));
-      this.addLabel(number(tick), [px + 16 * away[0], py + 16 * away[1]], "tick");
+      this.addLabel(number(tick), [px + 17 * away[0], py + 13 * away[1]], "tick");
     }
-    const [mx, my] = this.project(at(0.5)), far = away[1] === 0 ? 54 : Math.abs(end[0] - start[0]) > 2 * Math.abs(end[1] - start[1]) ? 40 : 58;
-    this.addLabel(label(name, unit), [mx + far * away[0], my + far * away[1]], away[0] < 0 && away[1] === 0 ? "axis upright" : "axis");
+    const upright = Math.abs(end[1] - start[1]) > 2 * Math.abs(end[0] - start[0]), words = label(name, unit);
+    const far = upright ? 48 : 36 + 3 * words.length * Math.abs(away[0]);
+    this.addLabel(words, [half[0] + far * away[0], half[1] + far * away[1]], upright ? "axis upright" : "axis");
   }
 
   private addLabel(text: string, at: [number, number], kind: string): void {
@@ -458,18 +464,15 @@ function slow(renderer: WebGLRenderer): boolean {
 
 function place(element: HTMLElement, [x, y]: [number, number]): void { element.style.transform = `translate(${x.toFixed(1)}px, ${y.toFixed(1)}px) translate(-50%, -50%)`; }
 
-/** Normals at points: of the triangles around them, by their areas. */
-function normals(x: Float32Array, t: Int32Array): Float32Array {
+/** Normals at points: of the triangles around them, by their areas; over the parameters sheets turn over with their index. */
+function normals(x: Float32Array, t: Int32Array, odd: (triangle: number) => boolean): Float32Array {
   const out = new Float32Array(x.length);
   for (let i = 0; i < t.length; i += 3) {
     const [a, b, c] = [3 * t[i], 3 * t[i + 1], 3 * t[i + 2]];
     const [ux, uy, uz] = [x[b] - x[a], x[b + 1] - x[a + 1], x[b + 2] - x[a + 2]], [vx, vy, vz] = [x[c] - x[a], x[c + 1] - x[a + 1], x[c + 2] - x[a + 2]];
-    let n = [uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx];
-    for (const k of [a, b, c]) {
-      // corners are in any order: every triangle is turned towards what its corner has so far
-      const side = n[0] * out[k] + n[1] * out[k + 1] + n[2] * out[k + 2] < 0 ? -1 : 1;
-      for (let j = 0; j < 3; j++) out[k + j] += side * n[j];
-    }
+    const n = [uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx];
+    const side = n[1] < 0 === odd(i / 3) ? 1 : -1;
+    for (const k of [a, b, c]) for (let j = 0; j < 3; j++) out[k + j] += side * n[j];
   }
   return out;
 }

@@ -4,6 +4,7 @@
 export function number(value: number, digits = 4): string {
   if (!Number.isFinite(value)) return "–";
   const size = Math.abs(value);
+  if (size < 1e-12) return "0";
   const text = size !== 0 && (size < 1e-4 || size >= 1e6) ? value.toExponential(Math.max(0, digits - 2)) : String(Number(value.toPrecision(digits)));
   return text.replace("e+", "e").replaceAll("-", "−");
 }

@@ -22,7 +22,7 @@ from equimorph.model import Descriptor, Disc, Obstacle
 from equimorph.plotting.curves import corner_steps, snap_steps
 from equimorph.plotting.support_symbols import AWAY, SYMBOLS, UPRIGHT
 from equimorph.structures import States, effort_of, margin_of
-from equimorph.tasks import Route
+from equimorph.tasks.route import Route
 
 _ROUTE_STATES = 400
 """States of a route that a page holds."""

@@ -16,7 +16,7 @@ from equimorph.explorer.packing import json_in_html, pack
 from equimorph.manifold import EquilibriumSet, SnapGraph, snap_graph
 from equimorph.model import Descriptor, Progress
 from equimorph.storage.files import write_text
-from equimorph.tasks import Route
+from equimorph.tasks.route import Route
 
 SCRIPT = "explorer.min.js"
 """Program of the page, which ``make explorer`` builds from the folder ``explorer``."""
