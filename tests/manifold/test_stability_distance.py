@@ -71,11 +71,15 @@ def test_folds_of_the_other_branch_do_not_count_in_any_unit(stiffness, x, force)
         distance = stability_distance(eset, state)
 
     def least(sign: float) -> float:
-        t = np.linspace(0.0, 1.3, 2_000_001)
-        return np.hypot(np.cos(t) ** 3 - x, stiffness * (sign * np.sin(t) ** 3 - force)).min()
+        def gap(t):
+            return np.hypot(np.cos(t) ** 3 - x, stiffness * (sign * np.sin(t) ** 3 - force))
 
-    # by the spacing of t, along which the gap is nearly stationary in one direction only
-    assert distance.in_parameters == pytest.approx(least(1.0), abs=2e-6)
+        t = np.linspace(0.0, 1.3, 2001)
+        nearest = np.clip(np.argmin(gap(t)), 1, len(t) - 2)
+        bounds = t[nearest - 1], t[nearest + 1]
+        return minimize_scalar(gap, bounds=bounds, method="bounded", options={"xatol": 1e-12}).fun
+
+    assert distance.in_parameters == pytest.approx(least(1.0), abs=1e-9)
     assert force == 0.0 or least(-1.0) < 0.999 * least(1.0)
     assert distance.nearest.z[0] > 0.0
 

@@ -60,6 +60,7 @@ class Table:
     def __init__(self, sums: list[Sum], *shape: int) -> None:
         exponents = sorted({exponents for each in sums for exponents in each.terms})
         self.exponents = np.array(exponents or [(0,) * 1])
+        self.highest = int(self.exponents.max(initial=0))
         self.factors = np.zeros((len(self.exponents), len(sums)))
         for i, each in enumerate(sums):
             for term, factor in each.terms.items():
@@ -68,8 +69,14 @@ class Table:
 
     def __call__(self, z: np.ndarray, p: np.ndarray) -> np.ndarray:
         x = np.concatenate([z, p], axis=1)
-        monomials = np.prod(x[:, None] ** self.exponents, axis=2)
-        return (monomials @ self.factors).reshape(len(x), *self.shape)
+        powers = [np.ones_like(x)]  # products are much cheaper than x ** exponents
+        for _ in range(self.highest):
+            powers.append(powers[-1] * x)
+        table = np.stack(powers)
+        monomials = table[self.exponents[:, 0], :, 0]
+        for i in range(1, self.exponents.shape[1]):
+            monomials = monomials * table[self.exponents[:, i], :, i]
+        return (monomials.T @ self.factors).reshape(len(x), *self.shape)
 
 
 class Polynomial(Structure):

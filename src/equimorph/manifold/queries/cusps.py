@@ -96,7 +96,8 @@ def _turning(fabric: Fabric, ends: Int[np.ndarray, "n 2"]) -> Int[np.ndarray, " 
     at = at.reshape(ends.shape)
     null, bend = null_vectors(fabric.setting, fabric.vertices.take(folded))
     sense = np.einsum("ni,ni->n", null[at[:, 0]], null[at[:, 1]])
-    return np.flatnonzero(bend[at[:, 0]] * bend[at[:, 1]] * np.sign(sense) < 0.0)
+    positive = bend >= 0.0  # zero has a sign, too: a cusp at a vertex lies on one of its two edges
+    return np.flatnonzero((positive[at[:, 0]] == positive[at[:, 1]]) == (sense < 0.0))
 
 
 def _between(
