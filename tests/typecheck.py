@@ -3,6 +3,7 @@
 Whether a call passes depends on types, dtypes and shapes only (on values too where the annotations
 name literals), and so a function checks each combination once: a call that looks like one that
 passed is not checked again. Checks are built at the first call of a function, not at its import.
+Functions without arrays and literals in their annotations are left to the static type checker.
 """
 
 import sys
@@ -65,12 +66,18 @@ def checked(thing: Any = None, *, typechecker: Callable[..., Any] = check) -> An
     if thing is None:
         return partial(checked, typechecker=typechecker)
     if isinstance(thing, FunctionType):
-        return _check_each_form_once(thing)
+        return _check_each_form_once(thing) if _depends_on_values(thing) else thing
     if isclass(thing):
-        if is_dataclass(thing) and not hasattr(thing.__init__, MARK):
-            thing.__init__ = _check_each_form_once(thing.__init__)
+        made = thing.__init__
+        if is_dataclass(thing) and not hasattr(made, MARK) and _depends_on_values(made):
+            thing.__init__ = _check_each_form_once(made)
         return thing
     return jaxtyped(thing, typechecker=typechecker)
+
+
+def _depends_on_values(function: Callable[..., Any]) -> bool:
+    """Whether annotations name dtypes, shapes or literals, which no static checker verifies."""
+    return "jaxtyping." in (told := str(function.__annotations__)) or "Literal" in told
 
 
 def _check_each_form_once(function: FunctionType) -> Callable[..., Any]:

@@ -85,7 +85,9 @@ def test_the_audit_says_what_descents_mean():
     )
 
 
-@pytest.mark.parametrize("radius", [0.1, 0.03, 0.003, 0.001])
+@pytest.mark.parametrize(
+    "radius", [0.003, *(pytest.param(e, marks=pytest.mark.slow) for e in (0.1, 0.03, 0.001))]
+)
 def test_closed_pieces_far_smaller_than_a_cell_are_found(radius):
     """Sphere x² + (p − .31)² + (r − .22)² = e² beside a sheet x = 3, in cells of 0.02 to 0.04."""
     gap = f"((p - 0.31)**2 + (r - 0.22)**2 - {radius}**2)"

@@ -17,7 +17,7 @@ from typecheck import unchecked
 
 Places = Float[np.ndarray, "places 2"]
 EXAMPLES = Path(__file__).parents[2] / "examples"
-FAST = {(1.0, 10.0), (2.5, 20.0), (12.0, 80.0)}
+FAST = {(2.5, 20.0)}
 CASES = [
     pytest.param(q, cap, marks=[] if (q, cap) in FAST else [pytest.mark.slow])
     for q in (0.0, 1.0, 2.5, 4.0, 6.0, 9.0, 12.0)
@@ -35,7 +35,11 @@ def test_left_half_load_runs_clean(q, cap):
 
 @pytest.mark.parametrize(
     ("load", "intervals"),
-    [("left-half", (31, 33)), ("uniform", (31, 33)), ("left-half", (51, 19))],
+    [
+        ("left-half", (31, 33)),
+        pytest.param("uniform", (31, 33), marks=pytest.mark.slow),
+        pytest.param("left-half", (51, 19), marks=pytest.mark.slow),
+    ],
 )
 def test_points_that_close_cells_along_a_constraint_are_of_their_sheet(load, intervals):
     """Both ends on one side of a grid triangle, and a fold inside that its edges do not show.
@@ -88,7 +92,7 @@ def _tongue(generator: np.random.Generator) -> tuple[EnergyStructure, float, Pla
 
 
 @pytest.mark.parametrize(
-    "seeds", [range(6), pytest.param(range(6, 50), marks=pytest.mark.slow)], ids=["few", "many"]
+    "seeds", [range(2), pytest.param(range(2, 50), marks=pytest.mark.slow)], ids=["few", "many"]
 )
 def test_tongues_narrower_than_cells_are_lifted_whole(seeds):
     """Random tongues, closed forms; at 0.003 of the box beside the tip one in fifty may be lost.

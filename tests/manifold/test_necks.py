@@ -46,7 +46,7 @@ def test_necks_and_gaps_far_smaller_than_a_cell(radius, number):
     assert_known(lifted(form, centre, -(radius**2), (15, 14)), GAP)
 
 
-@pytest.mark.parametrize("number", [None, 1])
+@pytest.mark.parametrize("number", [pytest.param(None, marks=pytest.mark.slow), 1])
 def test_cone_points_are_named(number):
     form, centre = any_cone(number) if number is not None else (UPRIGHT, (0.0, 0.31, 0.22))
     audit = lifted(form, centre, 0.0, (15, 14)).audit

@@ -129,7 +129,7 @@ def island(radius: float, places: tuple[float, ...]) -> Polynomial:
 @pytest.mark.parametrize(
     ("radius", "places", "euler"),
     [
-        (0.1, (0.1,), 0),
+        pytest.param(0.1, (0.1,), 0, marks=pytest.mark.slow),
         (0.07, (0.1, 0.2), 2),
         pytest.param(0.3, (0.1, 0.2), 2, marks=pytest.mark.slow),
         pytest.param(0.2, (0.1, 0.2, 0.3), 0, marks=pytest.mark.slow),
