@@ -6,7 +6,7 @@ INSTALLED := .venv/.installed
 # One thread per worker in the linear algebra library: two workers share the machine.
 QUIET_THREADS := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 
-.PHONY: run paper test test-slow lint bench explorer clean
+.PHONY: run paper test test-slow lint docs bench explorer clean
 
 run: $(INSTALLED)
 	$(BIN)/equimorph run examples/arch.toml
@@ -27,6 +27,11 @@ lint: $(INSTALLED)
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
+# Sphinx keeps pages that have not changed; `make clean` removes them. No network is needed to read or to build.
+docs: .venv/.docs
+	$(BIN)/python -m sphinx --fail-on-warning --keep-going --quiet --jobs 2 docs results/docs
+	@echo "results/docs/index.html"
+
 bench: $(INSTALLED)
 	$(BIN)/python -m pytest -o addopts="--import-mode=importlib" -p no:xdist --benchmark-only benchmarks
 
@@ -45,3 +50,7 @@ $(INSTALLED): pyproject.toml
 	test -x $(BIN)/python || $(PYTHON) -m venv .venv
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
 	touch $(INSTALLED)
+
+.venv/.docs: $(INSTALLED)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev,docs]'
+	touch .venv/.docs

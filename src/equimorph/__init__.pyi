@@ -1,4 +1,8 @@
-"""The public face, for type checkers and for loading on first use."""
+"""The public face, for type checkers and for loading on first use.
+
+Names stand in groups by what one wants to do, the most used first; the reference in `docs` has a
+page for each group.
+"""
 
 from . import (
     charts as charts,
@@ -18,257 +22,307 @@ from . import (
     study as study,
     tasks as tasks,
 )
-from .charts import (
-    Atlas as Atlas,
-    AtlasPath as AtlasPath,
-    Barrier as Barrier,
-    Chart as Chart,
-    Charted as Charted,
-    DescriptorChart as DescriptorChart,
-    Domain as Domain,
-    Overlap as Overlap,
-    Projection as Projection,
-    Reduction as Reduction,
-    Transition as Transition,
-    dissect as dissect,
-    first_stable_on_path as first_stable_on_path,
-    highest as highest,
-    lowest as lowest,
-    nearest as nearest,
-    quasi_static as quasi_static,
-    reduce as reduce,
-)
-from .control import (
-    Belief as Belief,
-    Controller as Controller,
-    ControlStatus as ControlStatus,
-)
-from .dynamics import (
-    HeldLanding as HeldLanding,
-    Replay as Replay,
-    ReplaySettings as ReplaySettings,
-    SimulatedPlant as SimulatedPlant,
-    SnapInTime as SnapInTime,
-    replay as replay,
-    snap_in_time as snap_in_time,
-)
-from .equilibria import (
-    Branch as Branch,
-    CriticalCurve as CriticalCurve,
-    Event as Event,
-    EventKind as EventKind,
-    Landing as Landing,
-    Lifts as Lifts,
-    LimitLoad as LimitLoad,
-    LimitLoads as LimitLoads,
-    Path as Path,
-    TraceOptions as TraceOptions,
-    branch_curve as branch_curve,
-    branches as branches,
-    constraint_curve as constraint_curve,
-    cusp_curve as cusp_curve,
-    find_equilibria as find_equilibria,
-    fold_curve as fold_curve,
-    grazing_curve as grazing_curve,
-    held_over as held_over,
-    lift as lift,
-    limit_load as limit_load,
-    snap_landing as snap_landing,
-    worst_over as worst_over,
-)
-from .errors import (
-    CancelledError as CancelledError,
-    EquimorphError as EquimorphError,
-    InputError as InputError,
-)
-from .explorer import explore as explore
-from .manifold import (
-    Audit as Audit,
-    Components as Components,
-    EquilibriumSet as EquilibriumSet,
-    Location as Location,
-    SnapGraph as SnapGraph,
-    StabilityDistance as StabilityDistance,
-    components as components,
-    equilibrium_set as equilibrium_set,
-    locate as locate,
-    snap_graph as snap_graph,
-    stability_distance as stability_distance,
+
+# Describe a structure
+from .structures import (
+    Rod as Rod,
+    SpatialRod as SpatialRod,
+    Spring as Spring,
+    Truss as Truss,
+    Frame as Frame,
+    SpatialFrame as SpatialFrame,
+    EnergyStructure as EnergyStructure,
+    Bar as Bar,
+    Member as Member,
+    SpatialMember as SpatialMember,
+    End as End,
+    SpatialEnd as SpatialEnd,
+    Unknown as Unknown,
+    Structure as Structure,
 )
 from .model import (
-    Box as Box,
-    Constraint as Constraint,
-    Descriptor as Descriptor,
-    Disc as Disc,
-    Grid as Grid,
-    HalfPlane as HalfPlane,
     Parameter as Parameter,
-    Rates as Rates,
-    Schedule as Schedule,
-    Spline as Spline,
+)
+
+# Sections, materials and loads
+from .structures import (
+    CrossSection as CrossSection,
+    Strip as Strip,
+    Round as Round,
+    Tube as Tube,
+    OwnSection as OwnSection,
+    SectionProperties as SectionProperties,
+    PointForce as PointForce,
+    LineLoad as LineLoad,
+    Couple as Couple,
+    Pressure as Pressure,
+    Tendon as Tendon,
+    Curvature as Curvature,
+)
+
+# Measure and bound states
+from .structures import (
+    State as State,
+    States as States,
+    value_of as value_of,
+    effort_of as effort_of,
+    margin_of as margin_of,
+    distance_to as distance_to,
+    outside as outside,
+    LateralMode as LateralMode,
+    SpaceStability as SpaceStability,
+)
+from .model import (
+    Descriptor as Descriptor,
+    Constraint as Constraint,
+    Disc as Disc,
+    HalfPlane as HalfPlane,
     combined as combined,
     largest_of as largest_of,
 )
+from .equilibria import (
+    worst_over as worst_over,
+    held_over as held_over,
+)
+
+# Find equilibria and follow paths
 from .structures import (
-    Bar as Bar,
-    Couple as Couple,
-    CrossSection as CrossSection,
-    Curvature as Curvature,
-    End as End,
-    EnergyStructure as EnergyStructure,
-    Frame as Frame,
-    LateralMode as LateralMode,
-    LineLoad as LineLoad,
-    Member as Member,
-    OwnSection as OwnSection,
-    PointForce as PointForce,
-    Pressure as Pressure,
-    Rod as Rod,
-    Round as Round,
-    SectionProperties as SectionProperties,
-    SpaceStability as SpaceStability,
-    SpatialEnd as SpatialEnd,
-    SpatialFrame as SpatialFrame,
-    SpatialMember as SpatialMember,
-    SpatialRod as SpatialRod,
-    Spring as Spring,
-    State as State,
-    States as States,
-    Strip as Strip,
-    Structure as Structure,
-    Tendon as Tendon,
-    Truss as Truss,
-    Tube as Tube,
-    Unknown as Unknown,
-    distance_to as distance_to,
-    effort_of as effort_of,
-    margin_of as margin_of,
     natural_state as natural_state,
-    outside as outside,
-    value_of as value_of,
 )
-from .tasks.calibration.calibrate import (
-    Calibration as Calibration,
-    calibrate as calibrate,
+from .equilibria import (
+    find_equilibria as find_equilibria,
+    lift as lift,
+    Path as Path,
+    Lifts as Lifts,
+    TraceOptions as TraceOptions,
+    Event as Event,
+    EventKind as EventKind,
+    limit_load as limit_load,
+    LimitLoad as LimitLoad,
+    LimitLoads as LimitLoads,
+    branches as branches,
+    Branch as Branch,
+    snap_landing as snap_landing,
+    Landing as Landing,
 )
-from .tasks.calibration.measurements import (
-    MeasuredShape as MeasuredShape,
-    MeasuredValues as MeasuredValues,
+
+# Follow critical states
+from .equilibria import (
+    fold_curve as fold_curve,
+    branch_curve as branch_curve,
+    cusp_curve as cusp_curve,
+    constraint_curve as constraint_curve,
+    grazing_curve as grazing_curve,
+    CriticalCurve as CriticalCurve,
 )
-from .tasks.calibration.unknowns import (
-    Family as Family,
+
+# Compute all equilibria
+from .model import (
+    Box as Box,
+    Grid as Grid,
 )
-from .tasks.estimation import (
-    StateEstimate as StateEstimate,
-    estimate_state as estimate_state,
+from .manifold import (
+    equilibrium_set as equilibrium_set,
+    EquilibriumSet as EquilibriumSet,
+    Audit as Audit,
+    locate as locate,
+    Location as Location,
+    components as components,
+    Components as Components,
+    stability_distance as stability_distance,
+    StabilityDistance as StabilityDistance,
+    snap_graph as snap_graph,
+    SnapGraph as SnapGraph,
 )
-from .tasks.maps.curvature import (
-    CurvatureMap as CurvatureMap,
-    curvature_map as curvature_map,
+from .explorer import (
+    explore as explore,
 )
-from .tasks.maps.curves import (
-    MapCurve as MapCurve,
+
+# Choose coordinates and preferred states
+from .charts import (
+    Projection as Projection,
+    DescriptorChart as DescriptorChart,
+    dissect as dissect,
+    Atlas as Atlas,
+    AtlasPath as AtlasPath,
+    Chart as Chart,
+    Charted as Charted,
+    Domain as Domain,
+    Overlap as Overlap,
+    Transition as Transition,
+    reduce as reduce,
+    Reduction as Reduction,
+    Barrier as Barrier,
+    lowest as lowest,
+    highest as highest,
+    nearest as nearest,
+    quasi_static as quasi_static,
+    first_stable_on_path as first_stable_on_path,
 )
-from .tasks.maps.limit_load import (
-    LimitLoadMap as LimitLoadMap,
-    limit_load_map as limit_load_map,
-)
-from .tasks.motion.tracking import (
-    Tracking as Tracking,
-    track as track,
-)
-from .tasks.optimising.certificates import (
-    Certificate as Certificate,
-)
-from .tasks.optimising.landscapes import (
-    Landscape as Landscape,
-    landscape as landscape,
-)
-from .tasks.optimising.moving_optimum import (
-    follow_optimum as follow_optimum,
-)
-from .tasks.optimising.optimum import (
-    Optima as Optima,
-    Optimum as Optimum,
-    optimise as optimise,
-)
-from .tasks.optimising.optimum_path import (
-    FollowedOptimum as FollowedOptimum,
-)
-from .tasks.optimising.robust import (
-    RobustOptimum as RobustOptimum,
-    robust_optimum as robust_optimum,
-)
-from .tasks.optimising.strength import (
-    Strongest as Strongest,
-    StrongestSettings as StrongestSettings,
-    strongest as strongest,
-)
-from .tasks.planning.objectives import (
-    Objective as Objective,
-)
+
+# Plan motions without a snap
 from .tasks.planning.planner import (
     plan as plan,
-)
-from .tasks.planning.route_classes import (
-    alternatives as alternatives,
-)
-from .tasks.planning.sampling import (
-    SamplingOptions as SamplingOptions,
-    plan_sampled as plan_sampled,
-)
-from .tasks.planning.smoothing import (
-    smoothed as smoothed,
-)
-from .tasks.reach.reachable_sets import (
-    Reach as Reach,
-    attainable as attainable,
-    reachable as reachable,
-)
-from .tasks.robustness.derivatives import (
-    Sensitivity as Sensitivity,
-    limit_sensitivity as limit_sensitivity,
-    sensitivity as sensitivity,
-)
-from .tasks.robustness.imperfection import (
-    ImperfectionLaw as ImperfectionLaw,
-    imperfection_law as imperfection_law,
-)
-from .tasks.robustness.room import (
-    Room as Room,
-    stable_room as stable_room,
-)
-from .tasks.robustness.snaps import (
-    LeastSnap as LeastSnap,
-    least_snap as least_snap,
-)
-from .tasks.robustness.trials import (
-    Trials as Trials,
-    random_trials as random_trials,
 )
 from .tasks.route import (
     Route as Route,
 )
-from .tasks.shapes.solutions import (
-    Shapes as Shapes,
-    solve_shape as solve_shape,
-    solve_shapes as solve_shapes,
+from .tasks.planning.route_classes import (
+    alternatives as alternatives,
 )
-from .tasks.timing.retiming import (
-    retime as retime,
+from .tasks.planning.smoothing import (
+    smoothed as smoothed,
 )
-from .tasks.timing.speed import (
-    SpeedLimit as SpeedLimit,
-    deviation_bound as deviation_bound,
-    speed_limit as speed_limit,
+from .tasks.planning.sampling import (
+    plan_sampled as plan_sampled,
+    SamplingOptions as SamplingOptions,
+)
+from .tasks.planning.objectives import (
+    Objective as Objective,
+)
+from .model import (
+    Schedule as Schedule,
+    Spline as Spline,
+)
+from .tasks.verification.schedule_check import (
+    verify as verify,
+    Verification as Verification,
 )
 from .tasks.verification.proof import (
     Proof as Proof,
     ProofStatus as ProofStatus,
 )
-from .tasks.verification.schedule_check import (
-    Verification as Verification,
-    verify as verify,
+from .tasks.motion.tracking import (
+    track as track,
+    Tracking as Tracking,
+)
+
+# Find shapes, optima and what can be reached
+from .tasks.shapes.solutions import (
+    solve_shape as solve_shape,
+    solve_shapes as solve_shapes,
+    Shapes as Shapes,
+)
+from .tasks.optimising.optimum import (
+    optimise as optimise,
+    Optima as Optima,
+    Optimum as Optimum,
+)
+from .tasks.optimising.certificates import (
+    Certificate as Certificate,
+)
+from .tasks.optimising.robust import (
+    robust_optimum as robust_optimum,
+    RobustOptimum as RobustOptimum,
+)
+from .tasks.optimising.landscapes import (
+    landscape as landscape,
+    Landscape as Landscape,
+)
+from .tasks.optimising.moving_optimum import (
+    follow_optimum as follow_optimum,
+)
+from .tasks.optimising.optimum_path import (
+    FollowedOptimum as FollowedOptimum,
+)
+from .tasks.reach.reachable_sets import (
+    reachable as reachable,
+    attainable as attainable,
+    Reach as Reach,
+)
+
+# Map limit loads
+from .tasks.maps.limit_load import (
+    limit_load_map as limit_load_map,
+    LimitLoadMap as LimitLoadMap,
+)
+from .tasks.maps.curvature import (
+    curvature_map as curvature_map,
+    CurvatureMap as CurvatureMap,
+)
+from .tasks.maps.curves import (
+    MapCurve as MapCurve,
+)
+from .tasks.optimising.strength import (
+    strongest as strongest,
+    Strongest as Strongest,
+    StrongestSettings as StrongestSettings,
+)
+from .tasks.robustness.derivatives import (
+    limit_sensitivity as limit_sensitivity,
+)
+
+# Judge robustness
+from .tasks.robustness.derivatives import (
+    sensitivity as sensitivity,
+    Sensitivity as Sensitivity,
+)
+from .tasks.robustness.imperfection import (
+    imperfection_law as imperfection_law,
+    ImperfectionLaw as ImperfectionLaw,
+)
+from .tasks.calibration.unknowns import (
+    Family as Family,
+)
+from .tasks.robustness.room import (
+    stable_room as stable_room,
+    Room as Room,
+)
+from .tasks.robustness.snaps import (
+    least_snap as least_snap,
+    LeastSnap as LeastSnap,
+)
+from .tasks.robustness.trials import (
+    random_trials as random_trials,
+    Trials as Trials,
+)
+
+# Learn from measurements
+from .tasks.estimation import (
+    estimate_state as estimate_state,
+    StateEstimate as StateEstimate,
+)
+from .tasks.calibration.calibrate import (
+    calibrate as calibrate,
+    Calibration as Calibration,
+)
+from .tasks.calibration.measurements import (
+    MeasuredShape as MeasuredShape,
+    MeasuredValues as MeasuredValues,
+)
+
+# Move in time and control
+from .model import (
+    Rates as Rates,
+)
+from .tasks.timing.retiming import (
+    retime as retime,
+)
+from .tasks.timing.speed import (
+    speed_limit as speed_limit,
+    SpeedLimit as SpeedLimit,
+    deviation_bound as deviation_bound,
+)
+from .dynamics import (
+    replay as replay,
+    Replay as Replay,
+    ReplaySettings as ReplaySettings,
+    snap_in_time as snap_in_time,
+    SnapInTime as SnapInTime,
+    HeldLanding as HeldLanding,
+    SimulatedPlant as SimulatedPlant,
+)
+from .control import (
+    Controller as Controller,
+    Belief as Belief,
+    ControlStatus as ControlStatus,
+)
+
+# Errors
+from .errors import (
+    EquimorphError as EquimorphError,
+    InputError as InputError,
+    CancelledError as CancelledError,
 )
 
 __version__: str

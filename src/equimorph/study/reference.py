@@ -12,10 +12,12 @@ from typing import Any, Literal, get_args, get_origin
 from pydantic.fields import FieldInfo
 
 from equimorph.manifold import equilibrium_set
+from equimorph.structures import KINDS as STRUCTURES
 from equimorph.study.extent import SetSection
 from equimorph.study.fields import Section
 from equimorph.study.kinds import KINDS
 from equimorph.study.question import Kind
+from equimorph.study.structures import StructureSection
 
 TITLE = """\
 # Keys of study files
@@ -40,7 +42,8 @@ SHARED = {
 
 def reference() -> str:
     """Return the page as Markdown: each table with its tasks, keys, defaults and meanings."""
-    pages = [TITLE, _of_set()]
+    structures = sorted(StructureSection.__subclasses__(), key=_kind_of)
+    pages = [TITLE, *map(_of_structure, structures), _of_set()]
     return "\n".join([*pages, *map(_of_kind, KINDS)])
 
 
@@ -63,6 +66,16 @@ def meanings(task: Callable[..., Any]) -> dict[str, str]:
         else:
             found |= {name: f"{found.get(name, '')} {line.strip()}".strip() for name in names}
     return {name: _first_sentence(words) for name, words in found.items()}
+
+
+def _kind_of(section: type[StructureSection]) -> str:
+    return str(get_args(section.model_fields["kind"].annotation)[0])
+
+
+def _of_structure(section: type[StructureSection]) -> str:
+    structure = STRUCTURES[_kind_of(section)]
+    title = f"[structure] of kind {_kind_of(section)}"
+    return _page(title, [structure], section, meanings(structure))
 
 
 def _of_set() -> str:
@@ -95,7 +108,7 @@ def _page(title: str, tasks: Any, section: type[Section], told: dict[str, str]) 
     head = ["| key | default | meaning |", "| --- | --- | --- |"]
     lines = [f"## `{title}`", "", names, "", *head]
     for key, field in section.model_fields.items():
-        if key != "name":
+        if key not in ("name", "kind"):
             words = f"{told.get(key, '')} {_choice(field)}".strip()
             lines.append(f"| `{key}` | {_default(field)} | {words} |")
     return "\n".join([*lines, ""])

@@ -17,7 +17,6 @@ Values = Float[np.ndarray, " pairs"]
 Numbers = Int[np.ndarray, " pairs"]
 Name = Literal["length", "travel", "work", "clearance"]
 Term = Name | Rates
-Wish = Annotated[Term | Sequence[tuple[float, Term]], ANYTHING]
 
 NAMES: tuple[Name, ...] = get_args(Name)
 LEAST_MARGIN = 1e-6
@@ -114,6 +113,10 @@ class Objective:
         return float(self.costs(states, at[:-1], at[1:], EXACT).sum())
 
 
+Wish = Annotated[Term | Sequence[tuple[float, Term]] | Objective, ANYTHING]
+"""What a caller may pass as an objective."""
+
+
 def objective_of(wish: Wish, structure: Structure) -> Objective:
     """Check the objective that a caller passes.
 
@@ -122,8 +125,9 @@ def objective_of(wish: Wish, structure: Structure) -> Objective:
     InputError
         For an unknown name, a weight that is not positive, or rates of unknown parameters.
     """
-    single = isinstance(wish, str | Rates) or not isinstance(wish, Sequence)
-    terms = [(1.0, wish)] if single else list(wish)  # type: ignore[arg-type]
+    given = wish.terms if isinstance(wish, Objective) else wish
+    single = isinstance(given, str | Rates) or not isinstance(given, Sequence)
+    terms = [(1.0, given)] if single else list(given)  # type: ignore[arg-type]
     checked: list[tuple[float, Term]] = []
     for entry in terms:
         weight, term = _pair(entry)
