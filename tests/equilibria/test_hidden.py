@@ -162,16 +162,13 @@ def test_hysteresis_point_is_a_fold_in_which_the_path_does_not_turn(c, k, m, a, 
     assert (end.kind, end.detail) == ("fold", "the path touches a fold and goes on")
 
 
-@pytest.mark.parametrize("thorough", [True, False])
-def test_many_lanes_are_probed_together_each_as_if_alone(thorough):
+def test_many_lanes_are_probed_together_each_as_if_alone():
     """Lane by lane: the two branch points of `dipping(1e-3, 0)`, one of them, none of them."""
     form = dipping(1e-3, 0.0)
     stop = np.array([1.0, 0.01, -0.5, 0.9, 0.7])
     curve = ParameterLine(form, np.full((5, 1), -1.0), stop[:, None] + 1.0)
     z, options = np.zeros((5, 1)), TraceOptions(through_folds=True, through_branch_points=True)
-    outcome = with_hidden_events(
-        curve, z, trace(curve, z, options=options), options, thorough=thorough
-    )
+    outcome = with_hidden_events(curve, z, trace(curve, z, options=options), options)
     assert outcome.code.tolist() == [EventCode.ARRIVED] * 5
     root = np.sqrt(1e-3)
     places = curve.parameters(np.zeros(5))[outcome.passed.lanes, 0]
@@ -180,9 +177,7 @@ def test_many_lanes_are_probed_together_each_as_if_alone(thorough):
     assert places == pytest.approx([-root, root, -root, -root, root, -root, root], abs=1e-10)
     assert outcome.index.tolist() == [0, 1, 0, 0, 0]
     options = TraceOptions()
-    outcome = with_hidden_events(
-        curve, z, trace(curve, z, options=options), options, thorough=thorough
-    )
+    outcome = with_hidden_events(curve, z, trace(curve, z, options=options), options)
     assert outcome.code.tolist() == [
         EventCode.BRANCH_POINT,
         EventCode.BRANCH_POINT,

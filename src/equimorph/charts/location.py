@@ -19,6 +19,7 @@ from equimorph.manifold.geometry.simplices import volumes
 from equimorph.manifold.geometry.topology import Adjacency, adjacency, flags_of, orientation
 from equimorph.manifold.lookup.cell_index import CellIndex, Hits
 from equimorph.manifold.lookup.exact_states import root_weights
+from equimorph.model import are_feasible
 from equimorph.structures import States
 from equimorph.tolerances import SAME_STATE
 
@@ -223,9 +224,7 @@ class Cells:
         good = good & (index >= low[cell]) & (index <= high[cell])
         good &= self.eset.box.holds(p[:, self.coordinates.setting.free], slack=SLACK)
         good[good] = self.eset.structure.resolved(z[good], p[good])
-        for constraint in self.eset.constraints:
-            some = np.flatnonzero(good)
-            good[some] = constraint.excess(z[some], p[some]) <= SLACK
+        good[good] = are_feasible(self.eset.constraints, z[good], p[good], SLACK)
         return good
 
     @cached_property

@@ -52,14 +52,14 @@ def branching(structure: Structure, name: str) -> Test:
 
 def bound(constraint: Constraint) -> Test:
     """Excess over a bound, relative to it."""
-    size = max(1.0, abs(constraint.bound))
+    size = constraint.size
     return lambda at: constraint.excess(at.z, at.p) / size
 
 
 def grazing(structure: Structure, constraint: Constraint, name: str) -> Test:
     """Change of a constraint along the path in one parameter, per unit length."""
     place = position(structure.parameters, name)
-    size, h = max(1.0, abs(constraint.bound)), 1e-4
+    size, h = constraint.size, 1e-4
 
     def test(at: Critical) -> Values:
         dp = np.zeros_like(at.p)

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from equimorph.arrays import Lanes, Parameters, Values
-from equimorph.equilibria.kernels import MULTIPLIER_WEIGHT, squared_lengths
+from equimorph.equilibria.kernels import squared_lengths
 from equimorph.linalg import Border, BorderedSolution
 from equimorph.structures import Advance, Direction, Equations, LinearSystem, Structure
 from equimorph.structures.equations import advance_by
@@ -295,17 +295,8 @@ def along_parameters(t: Values) -> Parameters:
 
 def squared_length(metric: Metric, weight: Values, dz: Lanes, dt: Values) -> Values:
     """Squared length of a step (dz, dt) in the metric and the curve's own."""
-    return _squared(metric, weight, dz, dt, 0.0)
-
-
-def correction_size(metric: Metric, weight: Values, dz: Lanes, dt: Values) -> Values:
-    """Size of a Newton correction: its length, with the multipliers included lightly."""
-    return np.asarray(np.sqrt(_squared(metric, weight, dz, dt, MULTIPLIER_WEIGHT)))
-
-
-def _squared(metric: Metric, weight: Values, dz: Lanes, dt: Values, light: float) -> Values:
     out = np.empty(len(dz))
-    squared_lengths(np.ascontiguousarray(dz), dt, weight, metric.mass, light, out)
+    squared_lengths(np.ascontiguousarray(dz), dt, weight, metric.mass, 0.0, out)
     return out
 
 

@@ -16,9 +16,9 @@ from equimorph.equilibria.locate import (
     locate_goal,
     locate_root,
 )
-from equimorph.equilibria.steps import Bracket, Front
+from equimorph.equilibria.steps import Bracket
 from equimorph.equilibria.trace_options import EventCode, TraceOptions
-from equimorph.model import Constraint
+from equimorph.model import Constraint, worst_excess
 
 
 @dataclass(frozen=True)
@@ -45,8 +45,7 @@ class Events(Columns):
             none, none, np.zeros((0, size)), np.zeros(0), np.zeros(0),
             np.zeros((0, 2), int), np.zeros(0, bool),
         )  # fmt: skip
-        columns = zip(*(vars(part).values() for part in (nothing, *parts)), strict=True)
-        whole = cls(*(np.concatenate(column) for column in columns))
+        whole = cls.concatenate([nothing, *parts])
         return whole.take(np.lexsort((whole.travelled, whole.lanes)))
 
     def near_side(self, events: Int[np.ndarray, " some"]) -> Int[np.ndarray, " some"]:
@@ -91,23 +90,9 @@ def events_at(bracket: Bracket, code: EventCode, place: Located) -> Events:
 
 def _join(brackets: list[Bracket], bit: int) -> Bracket | None:
     """All brackets in which `bit` happened, as one."""
-    parts = [(b, np.flatnonzero(b.what & bit)) for b in brackets]
-    parts = [(b, at) for b, at in parts if len(at)]
-    if not parts:
-        return None
-
-    def gather(name: str) -> Front:
-        fronts = [vars(getattr(b, name).take(at)) for b, at in parts]
-        return Front(**{key: np.concatenate([f[key] for f in fronts]) for key in fronts[0]})
-
-    return Bracket(
-        np.concatenate([b.lanes[at] for b, at in parts]),
-        gather("before"),
-        gather("after"),
-        np.concatenate([b.step[at] for b, at in parts]),
-        np.concatenate([b.travelled[at] for b, at in parts]),
-        np.concatenate([b.what[at] for b, at in parts]),
-    )
+    chosen = [(bracket, np.flatnonzero(bracket.what & bit)) for bracket in brackets]
+    parts = [bracket.take(at) for bracket, at in chosen if len(at)]
+    return Bracket.concatenate(parts) if parts else None
 
 
 def _locate(
@@ -125,6 +110,6 @@ def _locate(
 
     def worst(some: Int[np.ndarray, " lanes"], z: Lanes, t: Values) -> Values:
         z, p = here.take(some).states(z, t)
-        return np.asarray(np.max([c.excess(z, p) for c in constraints], axis=0))
+        return worst_excess(constraints, z, p)
 
     return locate_root(here, bracket, worst)

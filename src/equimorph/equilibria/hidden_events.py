@@ -1,17 +1,15 @@
 """Events that steps do not show: eigenvalues that touch zero, cross it twice, or vanish together.
 
 Between neighbouring points of a path the eigenvalue of F_z nearest to zero is the cubic through its
-values and slopes. Where that comes close to zero, the step is searched. For many lanes, a test
-function that costs one solve per point first selects the steps in which the eigenvalue is worth its
-price.
+values and slopes. Where that comes close to zero, the step is searched.
 """
 
 from dataclasses import replace
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 
-from equimorph.arrays import Lanes, Parameters, Some, Values
+from equimorph.arrays import Flags, Lanes, Parameters, Some, Values
 from equimorph.equilibria.curves import Curve, dual
 from equimorph.equilibria.events import Events, locate_all
 from equimorph.equilibria.inside_steps import AT_EVENT, CLOSE, look_inside, probe_at, step_between
@@ -20,11 +18,6 @@ from equimorph.equilibria.trace import Traces
 from equimorph.equilibria.trace_options import EventCode, TraceOptions
 from equimorph.structures import Structure
 
-DOUBTFUL = 0.4
-"""Least value of the test function between two points, as a share of those at its ends, from which
-on the eigenvalue is computed."""
-COLUMNS = 3
-"""Right-hand sides of the solve for the test function: the smallest eigenvalues that it sees."""
 AT_ONCE = 1024
 """Points, or lanes, that are evaluated together: they stay in the cache."""
 Counts = Int[np.ndarray, " lanes"]
@@ -37,15 +30,13 @@ def with_hidden_events(
     z: Lanes,
     outcome: Traces,
     options: TraceOptions,
-    *,
-    thorough: bool = True,
 ) -> Traces:
     """Traces of recorded lanes, started at z, completed by what their steps did not show.
 
     The first hidden event that stops a lane becomes its end. See `hidden_events`.
     """
     points = recorded_points(curve, z, outcome)
-    inside = hidden_events(curve, points, options, thorough=thorough)
+    inside = hidden_events(curve, points, options)
     last_ones = _before_ends(curve, points, outcome)
     hidden = Events.join([inside, last_ones], z.shape[1])
     if len(hidden.code) == 0:
@@ -117,9 +108,7 @@ def recorded_points(curve: Curve, z: Lanes, outcome: Traces) -> Points:
     return Points.join([start, outcome.points, regular], z.shape[1])
 
 
-def hidden_events(
-    curve: Curve, points: Points, options: TraceOptions, *, thorough: bool = True
-) -> Events:
+def hidden_events(curve: Curve, points: Points, options: TraceOptions) -> Events:
     """Folds and branch points between the points of traced paths that their steps do not show.
 
     An eigenvalue that touches zero is one event that leaves the index as it is; one that crosses
@@ -131,20 +120,13 @@ def hidden_events(
         The curves of all lanes.
     points
         Their points, from the start on, sorted by lane and length.
-    thorough
-        Look at the eigenvalue nearest to zero at every point, by six solves each. Else only where
-        `gaps`, by one solve each, leaves a doubt: enough for rods, whose lowest modes are smooth,
-        but an eigenvalue that is small in a mode unlike its columns may touch zero unseen.
     """
     found = list[Events]()
-    near = np.arange(len(points.t)) if thorough else _doubtful_points(points, gaps(curve, points))
-    if len(near) < 2:
+    if len(points.t) < 2:
         return Events.join(found, curve.structure.size)
-    lanes, index = points.lanes[near], points.index[near]
-    many = curve.take(lanes)
-    probe = probe_at(many, fronts(many, points, near), points.travelled[near])
-    low = _lowest(np.abs(probe.value), _neighbours(points, near), CLOSE)
-    kept = np.flatnonzero(~low)
+    lanes, index, many = points.lanes, points.index, curve.take(points.lanes)
+    probe = probe_at(many, fronts(many, points, np.arange(len(lanes))), points.travelled)
+    kept = np.flatnonzero(~_lowest(np.abs(probe.value), lanes, index))
     few, sign = probe.take(kept), np.sign(probe.value[kept])
     values, slopes = sign * few.value, sign * few.slope
     ends = values[:-1], values[1:]
@@ -153,7 +135,7 @@ def hidden_events(
     # a path may start or arrive right at an event: that is no hidden one
     close = (least < CLOSE * smaller) & (smaller > AT_EVENT * larger)
     skips = np.diff(kept) > 1
-    same = (np.diff(near[kept]) == 1 + skips) & (np.diff(lanes[kept]) == 0)
+    same = (np.diff(kept) == 1 + skips) & (np.diff(lanes[kept]) == 0)
     for i in np.flatnonzero((close | skips) & same & (np.diff(index[kept]) == 0)):
         pair = (few.take(np.array([i])), few.take(np.array([i + 1])))
         first = float(probe.length[kept[i] + 1]) if skips[i] else None
@@ -163,85 +145,15 @@ def hidden_events(
     return Events.join(found, curve.structure.size)
 
 
-def gaps(curve: Curve, points: Points) -> Values:
-    """Test function ``1 / det(BᵀF_z⁻¹B)``: zero where F_z is singular.
+def _lowest(value: Values, lanes: Some, index: Some) -> Flags:
+    """Points near a least value, which could otherwise hide between two steps.
 
-    By the formula of Cauchy and Binet it is close to a multiple of the product of the smallest
-    eigenvalues, as many as B has columns, which are smooth and do not act on the multipliers. As
-    long as the index is zero it has no poles.
+    Both neighbours belong to the same lane and have the same index.
     """
-    structure, out = curve.structure, np.empty(len(points.t))
-    n, count = structure.unknowns, min(COLUMNS, structure.unknowns)
-    place, wave = (np.arange(n) + 0.5) / n, np.arange(count)[:, None]
-    b = np.zeros((count, structure.size))
-    b[:, :n] = structure.mass * np.cos(np.pi * (wave + 0.37) * place + 0.6 * wave)
-    rhs = np.tile(b, (min(AT_ONCE, len(out)), 1, 1))
-    for start in range(0, len(out), AT_ONCE):
-        some = slice(start, start + AT_ONCE)
-        lanes = points.lanes[some]
-        p = curve.take(lanes).parameters(points.t[some])
-        y = structure.solve(np.ascontiguousarray(points.z[some]), p, rhs[: len(lanes)]).x
-        with np.errstate(all="ignore"):
-            small = y.reshape(-1, structure.size) @ b.T
-            out[some] = 1.0 / np.linalg.det(small.reshape(-1, count, count))
-    return out
-
-
-def _doubtful_points(points: Points, gap: Values) -> Some:
-    """Ends of all steps inside which the test function may come close to zero, and neighbours."""
-    lanes, length = points.lanes, points.travelled
-    steps = (lanes[1:] == lanes[:-1]) & (points.index[1:] == points.index[:-1])
-    sign = np.sign(gap)
-    slopes = _slopes(lanes, length, gap)
-    ends = sign[:-1] * gap[:-1], sign[1:] * gap[1:]
-    rates = sign[:-1] * slopes[:-1], sign[1:] * slopes[1:]
-    least = least_inside(ends, rates, np.diff(length))[1]
-    # not <: NaN is suspicious, too; an odd number of poles or zeros changes the sign
-    doubtful = ~(least >= DOUBTFUL * np.minimum(*ends)) | (sign[:-1] != sign[1:])
-    near = np.zeros(len(gap), bool)
-    for shift in (0, 1):
-        near[shift : len(gap) - 1 + shift] |= doubtful & steps
-    low = _lowest(np.abs(gap), _neighbours(points, np.arange(len(gap))), DOUBTFUL)
-    for shift in (-1, 0, 1):
-        near |= np.roll(low, shift)
-    return np.flatnonzero(near)
-
-
-def _slopes(lanes: Int[np.ndarray, " points"], length: Values, value: Values) -> Values:
-    """Slopes of parabolas through three neighbours on a lane; nan on lanes of fewer points."""
-    out, along = np.full(len(value), np.nan), lanes[1:] == lanes[:-1]
-    step = np.diff(length)
-    rise = np.diff(value) / np.where(along, np.maximum(step, 1e-300), 1.0)
-    inner = 1 + np.flatnonzero(along[1:] & along[:-1])
-    before, after = step[inner - 1], step[inner]
-    out[inner] = (after * rise[inner - 1] + before * rise[inner]) / (before + after)
-    starts = along & np.append(True, ~along[:-1])
-    first = np.flatnonzero(starts & np.append(along[1:], False))
-    out[first] = 2.0 * rise[first] - out[first + 1]
-    last = 1 + np.flatnonzero(along & np.append(~along[1:], True))
-    last = last[np.isin(last - 1, inner)]
-    out[last] = 2.0 * rise[last - 1] - out[last - 1]
-    return out
-
-
-def _neighbours(points: Points, near: Some) -> Bool[np.ndarray, " some"]:
-    """Which of the points have both neighbours among them, on one lane and with one index."""
-    out = np.zeros(len(near), bool)
-    lanes, index = points.lanes[near], points.index[near]
-    whole = near[2:] - near[:-2] == 2
-    for column in (lanes, index):
-        whole &= (column[2:] == column[1:-1]) & (column[:-2] == column[1:-1])
-    out[1:-1] = whole
-    return out
-
-
-def _lowest(
-    value: Float[np.ndarray, " some"], inner: Bool[np.ndarray, " some"], share: float
-) -> Bool[np.ndarray, " some"]:
-    """Points near a least value, which could otherwise hide between two steps."""
-    out = np.zeros(len(value), bool)
-    out[1:-1] = inner[1:-1] & ~(value[1:-1] >= share * np.minimum(value[:-2], value[2:]))
-    return out
+    alike, low = (np.diff(lanes) == 0) & (np.diff(index) == 0), np.zeros(len(value), bool)
+    low[1:-1] = ~(value[1:-1] >= CLOSE * np.minimum(value[:-2], value[2:]))
+    low[1:-1] &= alike[1:] & alike[:-1]
+    return low
 
 
 def fronts(curve: Curve, points: Points, near: Some) -> Front:

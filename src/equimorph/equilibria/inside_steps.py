@@ -66,9 +66,7 @@ def inside_step(
     if one is known.
     """
     both = curve.take(np.zeros(2, int))
-    columns = zip(*(vars(front).values() for front in ends), strict=True)
-    front = Front(*(np.concatenate(column) for column in columns))
-    probe = probe_at(both, front, np.array(lengths[:2]))
+    probe = probe_at(both, Front.concatenate(ends), np.array(lengths[:2]))
     smaller, larger = np.sort(np.abs(probe.value))
     # a path may start or arrive right at an event: that is no hidden one
     if smaller <= AT_EVENT * larger:

@@ -233,10 +233,6 @@ EQUILIBRIUM = 1e-8
 """Residual below which a state is an equilibrium."""
 
 
-def _size(constraint: Constraint) -> float:
-    return max(1.0, abs(constraint.bound))
-
-
 def check_start(state: State, within: Sequence[Constraint] = ()) -> None:
     """Raise `InputError` unless `state` is an equilibrium that obeys the constraints."""
     if not state.residual < EQUILIBRIUM:
@@ -245,7 +241,7 @@ def check_start(state: State, within: Sequence[Constraint] = ()) -> None:
             f"got a residual of {state.residual:.2g}."
         )
     for constraint in within:
-        if constraint.excess(state.z[None], state.p[None])[0] > ON_BOUND * _size(constraint):
+        if constraint.excess(state.z[None], state.p[None])[0] > ON_BOUND * constraint.size:
             value = constraint.descriptor(state)
             raise InputError(
                 f"`state` must obey {constraint}; got {constraint.descriptor.name} = {value:.6g}."
@@ -282,5 +278,5 @@ def violations(states: States, within: Sequence[Constraint]) -> Flags:
     """Which states exceed a bound by more than round-off."""
     over = np.zeros(len(states), bool)
     for c in within:
-        over |= c.excess(states.z, states.p) > ON_BOUND * _size(c)
+        over |= c.excess(states.z, states.p) > ON_BOUND * c.size
     return over

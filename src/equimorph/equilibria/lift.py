@@ -9,6 +9,7 @@ from jaxtyping import Float, Int, Shaped
 
 from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Flags, Lanes, Parameters, Some, Values
+from equimorph.columns import Columns
 from equimorph.equilibria.critical import criticality
 from equimorph.equilibria.curves import Curve
 from equimorph.equilibria.hidden_events import with_multiple_points
@@ -157,8 +158,8 @@ def lift_many(
     return ledger.lifts(within, options.record)
 
 
-@dataclass
-class _Part:
+@dataclass(frozen=True)
+class _Part(Columns):
     """Events or points of one leg."""
 
     lane: Some
@@ -246,14 +247,12 @@ class _Ledger:
             none, np.zeros((0, size)), np.zeros((0, count)), np.zeros(0), none, none,
             np.zeros(0, "U1"),
         )  # fmt: skip
-        columns = {
-            name: np.concatenate([vars(part)[name] for part in (first, *parts)])
-            for name in vars(first)
-        }
-        order = np.lexsort((columns["at"], columns["lane"])) if len(parts) > 1 else slice(None)
-        lane, z, p, at, code, index, words = (column[order] for column in columns.values())
-        states = States(self.begun.structure, z, p)
-        return Marks(lane, states, at, _kinds(code), index, words)
+        whole = _Part.concatenate([first, *parts])
+        if len(parts) > 1:
+            whole = whole.take(np.lexsort((whole.at, whole.lane)))
+        states = States(self.begun.structure, whole.z, whole.p)
+        kind = _kinds(whole.code)
+        return Marks(whole.lane, states, whole.at, kind, whole.index, whole.words)
 
 
 def _kinds(code: Int[np.ndarray, " some"]) -> Shaped[np.ndarray, " some"]:

@@ -116,8 +116,7 @@ def locate_fold(curve: Curve, bracket: Bracket) -> Located:
     bend, bow = 3 * rise - 2 * a - b, a + b - 2 * rise
     under = np.maximum(bend**2 - 3 * bow * a, 0.0)
     share = np.clip(a / (-bend + np.sign(a) * np.sqrt(under)), 1e-3, 1.0 - 1e-3)
-    root = root_inside(curve, bracket, lambda _, front: front.tangent_t, (a, b), share)
-    return Located(root.z, root.t, root.at, root.found)
+    return root_inside(curve, bracket, lambda _, front: front.tangent_t, (a, b), share)
 
 
 def locate_branch_point(curve: Curve, bracket: Bracket) -> Located:
@@ -181,8 +180,7 @@ def locate_root(
     def scalar(some: Some, front: Front) -> Values:
         return function(some, front.z, front.t)
 
-    root = root_inside(curve, bracket, scalar, (low, high), share)
-    return Located(root.z, root.t, root.at, root.found)
+    return root_inside(curve, bracket, scalar, (low, high), share)
 
 
 def locate_critical(curve: Curve, bracket: Bracket) -> Located:
@@ -193,18 +191,13 @@ def locate_critical(curve: Curve, bracket: Bracket) -> Located:
 
     def gap(some: Some, z: Lanes, t: Values) -> Values:
         z, p = curve.take(some).states(z, t)
-        return Critical(structure, z, p, b[some]).g
+        return np.asarray(sign[some] * Critical(structure, z, p, b[some]).g)
 
-    everyone = np.arange(len(bracket.lanes))
-    ends = tuple(gap(everyone, front.z, front.t) for front in (bracket.before, bracket.after))
-    share = np.clip(ends[0] / (ends[0] - ends[1]), 1e-3, 1.0 - 1e-3)
-    change = np.sign(ends[0]) != np.sign(ends[1])
-
-    def scalar(some: Some, front: Front) -> Values:
-        return gap(some, front.z, front.t)
-
-    root = root_inside(curve, bracket, scalar, (ends[0], ends[1]), share)
-    return Located(root.z, root.t, root.at, root.found & change)
+    everyone, sign = np.arange(len(bracket.lanes)), np.ones(len(bracket.lanes))
+    ends = [gap(everyone, front.z, front.t) for front in (bracket.before, bracket.after)]
+    sign = np.where(ends[0] > 0.0, -1.0, 1.0)
+    root = locate_root(curve, bracket, gap)
+    return replace(root, found=root.found & (np.sign(ends[0]) != np.sign(ends[1])))
 
 
 Scalar = Callable[[Some, Front], Float[np.ndarray, " some"]]
@@ -213,19 +206,9 @@ VALUE = 1e-13
 """Value of the scalar over that at the ends of the step that counts as zero."""
 
 
-@dataclass(frozen=True)
-class Root:
-    """Points where the scalar vanishes, their lengths from the start of the step, and success."""
-
-    z: Lanes
-    t: Values
-    at: Values
-    found: Flags
-
-
 def root_inside(
     curve: Curve, bracket: Bracket, scalar: Scalar, ends: tuple[Values, Values], guess: Values
-) -> Root:
+) -> Located:
     """Zero of a scalar with values of opposite signs at the ends of a step.
 
     Parameters
@@ -264,7 +247,7 @@ class _Search:
             (roots.SMALL, VALUE * (np.abs(ends[0]) + np.abs(ends[1]))),
         ):  # fmt: skip
             self._ends[row_number] = column
-        self.root = Root(old.z.copy(), np.empty(lanes), np.empty(lanes), np.zeros(lanes, bool))
+        self.root = Located(old.z.copy(), np.empty(lanes), np.empty(lanes), np.zeros(lanes, bool))
         mass = curve.metric.mass
         roots.begin(curve.weight, mass, self._places, *self._scalars, self._ends, lanes)
         self._here = curve
@@ -298,7 +281,7 @@ class _Search:
         """Write down what is finished and close the gaps."""
         root, counts = self.root, self._scalars[1]
         state = (self._places, counts, self._ends, self.active)
-        roots.hand_out(*state, root.z, root.t, root.at, root.found)
+        roots.hand_out(*state, root.z, root.t, root.step, root.found)
         left = (self._places, *self._scalars, self._ends, self.active)
         self.active = kernels.close_gaps(*left)
         self._here = self.curve.take(counts[kernels.LANE, : self.active])

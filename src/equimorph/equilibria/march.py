@@ -218,7 +218,7 @@ class Block:
         slopes = [_slope(here, constraint, *end) for end in ends]
         share, least = least_inside((-values[0], -values[1]), (-slopes[0], -slopes[1]), length)
         rise = -least - np.maximum(*values)
-        grazing = (rise > ON_BOUND * max(1.0, abs(constraint.bound))) & (least < MISS * rise)
+        grazing = (rise > ON_BOUND * constraint.size) & (least < MISS * rise)
         counts[kernels.STAGE, at[grazing]] = REFUSED
         wanted = np.clip(share, 0.1, 0.9) * length / kernels.BACK
         numbers[kernels.LENGTH, at[grazing]] = wanted[grazing]

@@ -11,7 +11,7 @@ from equimorph.equilibria.saddles import Pairs, strongest_pushes
 from equimorph.equilibria.settle import Guards, settle
 from equimorph.equilibria.trace import trace
 from equimorph.equilibria.trace_options import EventCode, TraceOptions
-from equimorph.model import Constraint
+from equimorph.model import Constraint, worst_relative_excess
 from equimorph.structures import Structure
 from equimorph.tolerances import SAME_STATE
 
@@ -57,11 +57,7 @@ class Ground:
 
     def excess(self, z: Lanes, group: Groups) -> Values:
         """Largest violation in units of its bound."""
-        parts = [
-            constraint.excess(z, self.p[group]) / max(1.0, abs(constraint.bound))
-            for constraint in self.within
-        ]
-        return np.asarray(np.max(parts, axis=0)) if parts else np.full(len(z), -np.inf)
+        return worst_relative_excess(self.within, z, self.p[group])
 
     def images(self, z: Lanes, group: int) -> list[Lanes]:
         """Images of states under the symmetries that leave the group's point unchanged."""

@@ -67,8 +67,7 @@ def trace_locus(
 
     Where they meet the curve is closed: it is the forward side, and the backward one its start.
     """
-    ways = (vars(start.turn(sign)).values() for sign in (-np.ones(1), np.ones(1)))
-    starts = Spots(*(np.concatenate(column) for column in zip(*ways, strict=True)))
+    starts = Spots.concatenate([start.turn(-np.ones(1)), start])
     here = begin(locus, starts, watches, options)
     lanes, sides = np.arange(2), [_side(here.take(np.array([lane])), watches) for lane in (0, 1)]
     while (on := np.array([sides[lane].end is None for lane in lanes], bool)).any():

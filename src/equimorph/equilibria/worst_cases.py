@@ -15,7 +15,7 @@ from equimorph.equilibria.settle import Guards, settle
 from equimorph.equilibria.trace import trace
 from equimorph.equilibria.trace_options import EventCode, TraceOptions
 from equimorph.errors import InputError
-from equimorph.model import Constraint, Descriptor, position
+from equimorph.model import Constraint, Descriptor, position, worst_relative_excess
 from equimorph.structures import Structure
 from equimorph.structures.quantities import find_descriptor
 
@@ -273,7 +273,8 @@ class _Range:
             left = 1.0 - (number - 1) / (len(self.values) - 1)
             out[lanes[~arrived]] = 1.0 + min(left, 1.0)
             lanes, here, p = lanes[arrived], here[arrived], p[arrived]
-            excesses = [each[arrived] for each in excesses] + [self._excess(here, p)]
+            more = worst_relative_excess(self.within, here, p)
+            excesses = [*(each[arrived] for each in excesses), more]
         out[lanes] = _highest(np.stack(excesses, axis=1)) if self.within else -1.0
         return out
 
@@ -287,11 +288,6 @@ class _Range:
             outcome = trace(line, z[moving], (), TraceOptions(record=False))
             arrived[moving], end[moving] = outcome.code == EventCode.ARRIVED, outcome.z
         return end, p + velocity, arrived
-
-    def _excess(self, z: Lanes, p: Parameters) -> Values:
-        """Worst relative excess of states."""
-        each = [c.excess(z, p) / max(1.0, abs(c.bound)) for c in self.within]
-        return np.max(each, axis=0) if each else np.full(len(z), -1.0)
 
 
 def _highest(values: Float[np.ndarray, "lanes samples"]) -> Values:

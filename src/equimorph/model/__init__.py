@@ -4,9 +4,12 @@ from equimorph.model.descriptor import (
     Constraint,
     Descriptor,
     Vanishing,
+    are_feasible,
     combined,
     eased,
     largest_of,
+    worst_excess,
+    worst_relative_excess,
 )
 from equimorph.model.drawing import (
     Actuator,
@@ -66,6 +69,7 @@ __all__ = [
     "Support",
     "SupportKind",
     "Vanishing",
+    "are_feasible",
     "combined",
     "content_of_descriptor",
     "content_of_function",
@@ -75,4 +79,6 @@ __all__ = [
     "parameter_vector",
     "position",
     "recalled",
+    "worst_excess",
+    "worst_relative_excess",
 ]

@@ -1,7 +1,7 @@
 """Descriptors: scalars of a state; constraints: comparisons of descriptors with numbers."""
 
 import json
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal, Protocol, overload, runtime_checkable
 
@@ -235,6 +235,11 @@ class Constraint:
             return [""] * len(z)
         return self.descriptor.vanishing.criticality(z, p)
 
+    @property
+    def size(self) -> float:
+        """What its excess is compared with: its bound, but at least one."""
+        return max(1.0, abs(self.bound))
+
     def excess(self, z: Lanes, p: Parameters) -> Values:
         """Amount by which states exceed the bound: positive where violated."""
         sign = 1.0 if self.sense == "<=" else -1.0
@@ -244,6 +249,32 @@ class Constraint:
     def holds(self, states: ManyStates) -> Flags:
         """Whether states obey the constraint."""
         return self.excess(states.z, states.p) <= 0.0
+
+
+def worst_excess(constraints: Sequence[Constraint], z: Lanes, p: Parameters) -> Values:
+    """Largest amount by which states exceed one of the bounds; −∞ without constraints."""
+    worst = np.full(len(z), -np.inf)
+    for constraint in constraints:
+        worst = np.maximum(worst, constraint.excess(z, p))
+    return worst
+
+
+def worst_relative_excess(constraints: Sequence[Constraint], z: Lanes, p: Parameters) -> Values:
+    """Largest excess relative to its bound; −∞ without constraints."""
+    worst = np.full(len(z), -np.inf)
+    for constraint in constraints:
+        worst = np.maximum(worst, constraint.excess(z, p) / constraint.size)
+    return worst
+
+
+def are_feasible(
+    constraints: Sequence[Constraint], z: Lanes, p: Parameters, slack: float = 0.0
+) -> Flags:
+    """Which states obey all constraints, up to a slack in units of the descriptors."""
+    good = np.ones(len(z), bool)
+    for constraint in constraints:
+        good[good] = constraint.excess(z[good], p[good]) <= slack
+    return good
 
 
 @check_arguments
@@ -304,4 +335,4 @@ def largest_of(name: str, *descriptors: Descriptor) -> Descriptor:
 @check_arguments
 def eased(constraint: Constraint) -> Constraint:
     """Constraint that rounding does not violate: optima lie on bounds."""
-    return replace(constraint, ease=EASE * max(1.0, abs(constraint.bound)))
+    return replace(constraint, ease=EASE * constraint.size)

@@ -61,7 +61,7 @@ def feasible_vertices(
     for constraint in within:
         sign = 1.0 if constraint.sense == "<=" else -1.0
         excess = sign * (vertex_values(eset, constraint.descriptor) - constraint.bound)
-        good &= excess <= SLACK * max(1.0, abs(constraint.bound))
+        good &= excess <= SLACK * constraint.size
     return good
 
 

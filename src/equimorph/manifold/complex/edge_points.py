@@ -7,6 +7,7 @@ from functools import partial
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from equimorph.equilibria.settle import lower_index
 from equimorph.linalg.lanes import results_of
 from equimorph.manifold.complex.marked_complex import TETRAHEDRA, Fabric, FacetMark, held_parameters
 from equimorph.manifold.complex.vertices import Vertices, free_vertices, vertices_of
@@ -16,10 +17,9 @@ from equimorph.manifold.geometry.exact_points import (
     Pinned,
     corrected,
     corrected_amid,
-    lower_index,
 )
 from equimorph.manifold.geometry.points import VertexKind
-from equimorph.manifold.geometry.setting import Setting
+from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.geometry.tangents import Cubics, Ends, split_step
 from equimorph.tolerances import IN_BOX, SAME_VERTEX
 
@@ -148,7 +148,7 @@ def _beside_sides(
     turned = first.rows @ np.swapaxes(second.rows, 1, 2)
     plane = first.rows + turned @ second.rows
     length = np.linalg.norm(second.place - first.place, axis=1)
-    place = _embed(fabric, z, p)
+    place = embed(fabric.setting, z, p)
     freely = _on_curves(fabric, mark, z, p, place, plane, length, first)
     found = np.zeros(len(ends), bool)
     for k in range(d):
@@ -165,7 +165,7 @@ def _beside_sides(
         end = first.take(own)
         row = plane[own][:, :, plane.shape[2] - d + k]
         end = replace(end, slopes=np.concatenate([end.slopes, row[:, None]], axis=1))
-        place[own] = _embed(fabric, near_z, near_p)
+        place[own] = embed(fabric.setting, near_z, near_p)
         given = near_z, near_p, place[own], plane[own], length[own]
         pinned = _on_curves(fabric, mark | FacetMark.SIDE << 2 * k, *given, end)
         z[own], p[own], found[own] = pinned.z, pinned.p, pinned.found
@@ -198,7 +198,7 @@ def _is_close(
     """Which points lie close to their places, between the ends of their edges and in the box."""
     first, second = (fabric.vertices.place[target.ends[:, side]] for side in range(2))
     length = np.linalg.norm(second - first, axis=1)
-    here = _embed(fabric, at.z, at.p)
+    here = embed(fabric.setting, at.z, at.p)
     close = at.found & (np.linalg.norm(here - place, axis=1) <= REACH * length)
     for end, part in ((first, target.t), (second, 1.0 - target.t)):
         close &= np.linalg.norm(here - end, axis=1) <= (part + EXCESS) * length
@@ -223,7 +223,7 @@ def _orthogonally(
     # the second space seen from the first, so that both bases point the same way
     turned = first.rows @ np.swapaxes(second.rows, 1, 2)
     plane = first.rows + turned @ second.rows
-    place = _embed(fabric, z, p)
+    place = embed(fabric.setting, z, p)
     length = np.linalg.norm(second.place - first.place, axis=1)
     if mark == 0 and rough:
         at: Corrected | Pinned = corrected_amid(setting, z, p, place, plane, length)
@@ -298,8 +298,10 @@ def _of_index(
 ) -> Bool[np.ndarray, " n"]:
     """Which points, of those that were found, have the right index."""
     good = found.copy()
-    count = lower_index if mark & (FacetMark.FOLD | FacetMark.CROSSING) else _index
-    good[found] = count(fabric.setting, at.z[found], at.p[found]) == lowest[found]
+    structure = fabric.setting.structure
+    singular = bool(mark & (FacetMark.FOLD | FacetMark.CROSSING))
+    count = partial(lower_index, structure) if singular else structure.index
+    good[found] = count(at.z[found], at.p[found]) == lowest[found]
     return good
 
 
@@ -337,17 +339,3 @@ def _along(
     own = np.tile(np.arange(len(chords))[:, None], (1, 2))
     flat = fabric.end(own, 0, mark).nearest(chords)
     return np.asarray(np.linalg.norm(flat, axis=1) >= ALONG * np.linalg.norm(chords, axis=1))
-
-
-def _index(
-    setting: Setting, z: Float[np.ndarray, "n size"], p: Float[np.ndarray, "n P"]
-) -> Int[np.ndarray, " n"]:
-    return setting.structure.index(z, p)
-
-
-def _embed(
-    fabric: Fabric, z: Float[np.ndarray, "n size"], p: Float[np.ndarray, "n P"]
-) -> Float[np.ndarray, "n coordinates"]:
-    setting = fabric.setting
-    u = z[:, : setting.structure.unknowns] * np.sqrt(setting.structure.mass)
-    return np.concatenate([u, p[:, setting.free] / setting.scales], axis=1)

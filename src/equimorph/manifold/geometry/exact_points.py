@@ -19,10 +19,10 @@ from equimorph.equilibria.critical import null_border
 from equimorph.equilibria.point_conditions import Condition, Crossing, Fold, Plane
 from equimorph.equilibria.point_conditions import Values as TakesValues
 from equimorph.equilibria.settle import Guards, Planes, Settled, Tangents, settle
-from equimorph.equilibria.settle import lower_index as index_below
 from equimorph.manifold.geometry.crossings import reduction
 from equimorph.manifold.geometry.points import Points, VertexKind
 from equimorph.manifold.geometry.setting import Setting, embed, principal_directions
+from equimorph.model import worst_excess
 
 Span = Float[np.ndarray, "lanes k d"]
 Numbers = Int[np.ndarray, " lanes"]
@@ -126,7 +126,7 @@ class Aim(Columns):
         directions, constraints = self.directions, self.setting.constraints
 
         def excess(z: Lanes, p: Parameters) -> Values:
-            return np.asarray(np.max([each.excess(z, p) for each in constraints], axis=0))
+            return worst_excess(constraints, z, p)
 
         return (
             *([Fold()] if self.fold else []),
@@ -224,11 +224,6 @@ def _crosses(aim: Aim, z: Lanes, p: Parameters) -> Flags:
     known = reduction(structure, z, p, null_border(structure, z, p), aim.directions)
     small = np.abs(structure.residual(z, p)).max(axis=1, initial=0.0) < RESIDUAL
     return np.asarray(known.crosses & small)
-
-
-def lower_index(setting: Setting, z: Lanes, p: Parameters) -> Numbers:
-    """Index on the lower side of folds: eigenvalues below the one that vanishes."""
-    return index_below(setting.structure, z, p)
 
 
 def pin(

@@ -30,6 +30,15 @@ def barycentric(
     return weights
 
 
+def shares_in(
+    corners: Float[np.ndarray, "n corners d"], places: Float[np.ndarray, "n d"]
+) -> Float[np.ndarray, "n corners"]:
+    """Barycentric coordinates, each place in its own simplex or orthogonally above it."""
+    sides = corners[:, 1:] - corners[:, :1]
+    inner = np.einsum("nd,ndk->nk", places - corners[:, 0], np.linalg.pinv(sides))
+    return np.concatenate([1.0 - inner.sum(axis=1, keepdims=True), inner], axis=1)
+
+
 def plane_bases(corners: Float[np.ndarray, "n 3 d"]) -> Float[np.ndarray, "n 2 d"]:
     """Orthonormal vectors along the planes of triangles in d dimensions."""
     sides = np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)

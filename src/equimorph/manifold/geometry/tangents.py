@@ -15,6 +15,7 @@ from equimorph.equilibria.point_conditions import second_derivatives
 from equimorph.linalg import orthonormal_rows
 from equimorph.manifold.geometry.kernels import square_sides
 from equimorph.manifold.geometry.setting import Setting, embed
+from equimorph.model import worst_excess
 
 CHUNK = 2048
 """Points whose tangent spaces are computed together: this bounds the memory."""
@@ -74,7 +75,7 @@ def cap_slopes(
 
     def worst(sign: float, k: int) -> Values:
         dz, dp = split_step(setting, sign * DIFFERENCE * frames[:, k])
-        return np.asarray(np.max([c.excess(z + dz, p + dp) for c in setting.constraints], axis=0))
+        return worst_excess(setting.constraints, z + dz, p + dp)
 
     slopes = [worst(1.0, k) - worst(-1.0, k) for k in range(frames.shape[1])]
     return np.stack(slopes, axis=1) / (2.0 * DIFFERENCE)

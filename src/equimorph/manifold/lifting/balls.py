@@ -13,12 +13,11 @@ from itertools import product
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from equimorph.arrays import Values
 from equimorph.manifold.complex.base_mesh import BaseMesh
 from equimorph.manifold.geometry.exact_points import Pinned, Span, middles, pin, pin_crossings
 from equimorph.manifold.geometry.points import Points, VertexKind
 from equimorph.manifold.geometry.setting import Setting
-from equimorph.manifold.geometry.simplices import volumes
+from equimorph.manifold.geometry.simplices import shares_in, volumes
 from equimorph.manifold.geometry.topology import distinct
 from equimorph.manifold.lifting.discs import Discs
 from equimorph.manifold.lifting.pairing import Pairing
@@ -75,18 +74,12 @@ def pin_in_cells(
             continue
         own = [groups[lane] for lane in lanes.tolist()]
         pinned = pin(setting, points, own, kind, span[lanes], member, share)
-        depth = np.where(pinned.found, depths(frames[lanes], pinned.p[:, setting.free]), -np.inf)
+        inside = shares_in(frames[lanes], pinned.p[:, setting.free]).min(axis=1)
+        depth = np.where(pinned.found, inside, -np.inf)
         better = depth > best[lanes]
         at = lanes[better]
         z[at], p[at], best[at], found[at] = pinned.z[better], pinned.p[better], depth[better], True
     return Pinned(z, p, found)
-
-
-def depths(frames: Frames, points: Float[np.ndarray, "lanes d"]) -> Values:
-    """Smallest barycentric coordinates in simplices with these corners; negative outside."""
-    sides = frames[:, 1:] - frames[:, :1]
-    shares = np.einsum("ld,ldk->lk", points - frames[:, 0], np.linalg.pinv(sides))
-    return np.asarray(np.minimum(shares.min(axis=1), 1.0 - shares.sum(axis=1)))
 
 
 SHEETS = 2

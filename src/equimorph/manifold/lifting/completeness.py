@@ -19,7 +19,7 @@ from equimorph.manifold.geometry.setting import Setting
 from equimorph.manifold.lifting.descents_of_set import descents_of_set, spread_over_strata
 from equimorph.manifold.lifting.seeds import Seeds, polish
 from equimorph.manifold.lookup.exact_states import lift_to
-from equimorph.model import Progress, position
+from equimorph.model import Progress, are_feasible, position
 from equimorph.structures import States
 
 STARTS = 200
@@ -121,8 +121,7 @@ def _scattered(eset: EquilibriumSet, count: int, generator: np.random.Generator)
     z, p = np.concatenate([fixed.z, freed.z]), np.concatenate([fixed.p, freed.p])
     found = np.concatenate([fixed.found, freed.found])
     found &= ((eset.box.lower <= p[:, free]) & (p[:, free] <= eset.box.upper)).all(axis=1)
-    for constraint in eset.constraints:
-        found[found] = constraint.excess(z[found], p[found]) <= 0.0
+    found[found] = are_feasible(eset.constraints, z[found], p[found])
     return States(structure, z[found], p[found])
 
 

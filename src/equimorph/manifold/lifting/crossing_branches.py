@@ -19,7 +19,7 @@ from equimorph.manifold.lifting.edges import EFFORTS
 from equimorph.manifold.lifting.flood import flood
 from equimorph.manifold.lifting.pairing import Pairing
 from equimorph.manifold.lifting.seeds import Seeds, polish
-from equimorph.model import Progress
+from equimorph.model import Progress, are_feasible
 
 DISTANCES = (0.03, 0.003, 0.0003)
 """Lengths of the first step from a crossing, in the metric, tried one after the other: of
@@ -130,12 +130,8 @@ def _starts(
         lines = line.take(owner[todo])
         front, found = step_along(lines, here.take(todo), np.full(len(todo), distance))
         inside = found & (front.t > 0.0) & (front.t < 1.0)
-        for constraint in pairing.setting.constraints:
-            inside &= constraint.excess(front.z, lines.parameters(front.t)) <= 0.0
-        wide = Front(*(each.copy() for each in vars(there).values()))
-        for name, column in vars(wide).items():
-            column[todo[inside]] = getattr(front, name)[inside]
-        there, good[todo[inside]] = wide, True
+        inside &= are_feasible(pairing.setting.constraints, front.z, lines.parameters(front.t))
+        there, good[todo[inside]] = there.with_rows(todo[inside], front.take(inside)), True
     at = np.flatnonzero(good)
     return at, there.take(at)
 

@@ -13,11 +13,11 @@ from jaxtyping import Float
 from scipy.optimize import brentq
 
 from equimorph.equilibria.critical import Critical, null_border
+from equimorph.equilibria.settle import lower_index
 from equimorph.manifold.geometry.exact_points import (
     Aim,
     Pinned,
     corrected,
-    lower_index,
     pin_crossings,
 )
 from equimorph.manifold.geometry.points import VertexKind
@@ -151,7 +151,7 @@ def _pin(pairing: Pairing, groups: Sequence[Group], *, cap: bool) -> list[int | 
     span = planes(pairing, [group.triangle for group in groups])
     pinned = pin_crossings(setting, store, [group.points for group in groups], span, cap)
     good = pinned.found & pairing.mesh.covers(pinned.p[:, setting.free])
-    low = lower_index(setting, pinned.z, pinned.p)
+    low = lower_index(setting.structure, pinned.z, pinned.p)
     return [
         store.add(pinned.z[k], pinned.p[k], int(low[k]), VertexKind.CROSSING) if good[k] else None
         for k in range(len(groups))
@@ -174,7 +174,7 @@ def _hub(pairing: Pairing, triangle: int, chord: Chord) -> int | None:
     span, rows = planes(pairing, [triangle]), (way / length)[None, None]
     sense = null_border(setting.structure, z[:1], p[:1])[0]
     quadratic, cubic = _coefficients(pairing, z, p, sense)
-    other = int(np.ptp(lower_index(setting, z, p)))
+    other = int(np.ptp(lower_index(setting.structure, z, p)))
     skew = (np.abs(quadratic) > SKEW * np.abs(cubic)).any()
     found: list[Pinned] = []
 

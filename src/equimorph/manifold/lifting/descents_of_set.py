@@ -8,14 +8,15 @@ from collections.abc import Container
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 
-from equimorph.arrays import Lanes, Parameters, Some
+from equimorph.arrays import Some
 from equimorph.equilibria.descents import descend
 from equimorph.equilibria.gradient_flow import Ending
 from equimorph.equilibria.settle import lower_index
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.manifold.geometry.points import VertexKind
+from equimorph.model import are_feasible
 from equimorph.structures import States
 
 VERTICES = 8
@@ -141,7 +142,7 @@ def _landings(
         outcomes[word] += int((code == ending).sum())
     at = np.flatnonzero(code == Ending.LANDED)
     resolved = structure.resolved(z[at], both[at])
-    within = resolved & _within(eset, z[at], both[at])
+    within = resolved & are_feasible(eset.constraints, z[at], both[at])
     outcomes["landed where states are not resolved"] += int((~resolved).sum())
     outcomes["landed beyond the constraints"] += int((resolved & ~within).sum())
     outcomes["landed"] += int(within.sum())
@@ -149,13 +150,6 @@ def _landings(
     target = np.full(len(code), NOWHERE)
     target[at[within]] = _strata(eset, landed)
     return landed, target.reshape(2, -1)
-
-
-def _within(eset: EquilibriumSet, z: Lanes, p: Parameters) -> Bool[np.ndarray, " lanes"]:
-    good = np.ones(len(z), bool)
-    for constraint in eset.constraints:
-        good &= constraint.excess(z, p) <= 0.0
-    return good
 
 
 def _strata(eset: EquilibriumSet, states: States) -> Some:

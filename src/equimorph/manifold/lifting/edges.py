@@ -12,14 +12,14 @@ from equimorph.arrays import Flags, Lanes
 from equimorph.equilibria import Guards, ParameterLine, TraceOptions, settle
 from equimorph.equilibria.curves import squared_length
 from equimorph.equilibria.kernels import FIRST_SHARE, LEAST_COSINE, MULTIPLIER_WEIGHT
-from equimorph.equilibria.settle import Held
+from equimorph.equilibria.settle import Held, lower_index
 from equimorph.equilibria.trace import Traces, trace
 from equimorph.equilibria.trace_options import EventCode
-from equimorph.manifold.geometry.exact_points import Aim, Pinned, corrected, lower_index
+from equimorph.manifold.geometry.exact_points import Aim, Pinned, corrected
 from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.lifting.pairing import Pairing, RayMark, Rays
-from equimorph.model import Constraint
+from equimorph.model import Constraint, are_feasible
 
 LONGEST = 0.5
 """Step in the metric above which the cheap way is not tried."""
@@ -88,9 +88,8 @@ def _step(
     product = (tangent[todo, :n] * end_tangent[:, :n]) @ structure.mass + there.weight**2
     end_length = np.sqrt(squared_length(structure, there.weight, end_tangent, one[: len(todo)]))
     good[todo] = end.found & (product >= LEAST_COSINE * length[todo] * end_length)
-    for constraint in constraints:
-        own = good[todo]
-        good[todo[own]] = constraint.excess(end.z[own], p[own]) <= 0.0
+    own = good[todo]
+    good[todo[own]] = are_feasible(constraints, end.z[own], p[own])
     return Direct(out, good)
 
 
@@ -249,7 +248,7 @@ def _inner(
         those = rays.take(passed.lanes[at[own]])
         pinned = _pin(pairing, those, z[own], p[own], VertexKind.CROSSING)
         z[own], p[own] = pinned.z, pinned.p
-        index[own] = lower_index(pairing.setting, pinned.z, pinned.p)
+        index[own] = lower_index(pairing.setting.structure, pinned.z, pinned.p)
         good[passed.lanes[at[own[~pinned.found]]]] = False
         crossed = passed.lanes[at[own]]
         keep[own] = _first_ones(pairing, crossed, pinned)

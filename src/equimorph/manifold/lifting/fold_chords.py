@@ -15,7 +15,7 @@ from equimorph.arrays import Flags, Some, Values
 from equimorph.columns import Columns
 from equimorph.manifold.geometry.exact_points import pin
 from equimorph.manifold.geometry.points import VertexKind
-from equimorph.manifold.lifting.balls import depths
+from equimorph.manifold.geometry.simplices import shares_in
 from equimorph.manifold.lifting.cells import Cells
 from equimorph.manifold.lifting.fold_forms import fold_forms
 from equimorph.manifold.lifting.pairing import Pairing
@@ -102,7 +102,8 @@ def sharp_turns(pairing: Pairing, chords: FoldChords) -> Turns | None:
     span = planes(pairing, sharp.triangle.tolist())
     middle = pin(setting, points, sharp.ends.tolist(), VertexKind.FOLD, span)
     corners = mesh.vertices[mesh.triangles[sharp.triangle]]
-    inside = middle.found & (depths(corners, middle.p[:, setting.free]) > BEYOND)
+    shares = shares_in(corners, middle.p[:, setting.free])
+    inside = middle.found & (shares > BEYOND).all(axis=1)
     return Turns(sharp.ends, sharp.triangle, sharp.normals, middle.z, middle.p, inside)
 
 
@@ -162,12 +163,3 @@ def _meetings(pairing: Pairing, chords: FoldChords) -> Float[np.ndarray, "n d"]:
     ends = pairing.points.p[chords.ends][:, :, pairing.setting.free] / scales
     level = (chords.normals * ends).sum(axis=2)
     return np.asarray((np.linalg.pinv(chords.normals) @ level[:, :, None])[:, :, 0] * scales)
-
-
-def shares_in(
-    corners: Float[np.ndarray, "n corners d"], places: Float[np.ndarray, "n d"]
-) -> Float[np.ndarray, "n corners"]:
-    """Return barycentric coordinates, each place in its own simplex."""
-    sides = np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)
-    inner = np.linalg.solve(sides, (places - corners[:, 0])[:, :, None])[:, :, 0]
-    return np.concatenate([1.0 - inner.sum(axis=1, keepdims=True), inner], axis=1)

@@ -9,7 +9,7 @@ from equimorph.equilibria.trace import trace
 from equimorph.equilibria.trace_options import EventCode
 from equimorph.manifold.complex.base_mesh import BaseMesh
 from equimorph.manifold.geometry.setting import Setting
-from equimorph.model import position
+from equimorph.model import are_feasible, position
 
 COARSE = 5
 """Approximate number of vertices along each parameter at which natural states are lifted."""
@@ -59,8 +59,7 @@ def polish(
     p = setting.parameters(mesh.vertices[vertices])
     settled = settle(setting.structure, z, p, guards=EXACT)
     good = settled.found
-    for constraint in setting.constraints:
-        good[good] = constraint.excess(settled.z[good], p[good]) <= 0.0
+    good[good] = are_feasible(setting.constraints, settled.z[good], p[good])
     return (vertices[good], settled.z[good], p[good], settled.index[good]), good
 
 

@@ -11,6 +11,7 @@ from jaxtyping import Bool, Float
 from equimorph.arrays import Some
 from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.setting import Setting
+from equimorph.manifold.geometry.simplices import shares_in
 from equimorph.manifold.lifting.approaches import approaches
 from equimorph.manifold.lifting.cells import Cells, Seen
 from equimorph.manifold.lifting.fold_chords import (
@@ -18,7 +19,6 @@ from equimorph.manifold.lifting.fold_chords import (
     beyond_folds,
     facing_folds,
     fold_chords,
-    shares_in,
     sharp_turns,
 )
 from equimorph.manifold.lifting.pairing import Pairing

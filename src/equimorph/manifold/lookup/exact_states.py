@@ -2,6 +2,7 @@
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
+from scipy.spatial.distance import cdist
 
 from equimorph.arrays import Flags, Lanes
 from equimorph.equilibria import ParameterLine, TraceOptions
@@ -11,6 +12,7 @@ from equimorph.manifold.lookup.kernels import root_shares
 from equimorph.model import Constraint
 from equimorph.structures import States, Structure
 from equimorph.structures.newton import Limits, newton
+from equimorph.tolerances import SAME_STATE
 
 ROUND_OFF = 1e-14
 """Bound of the next Newton correction, in the metric, below which a state is exact."""
@@ -92,3 +94,9 @@ def root_weights(
     weights = weights.copy()
     root_shares(weights, folded, CLOSEST)
     return weights
+
+
+def first_of_same(structure: Structure, z: Lanes) -> Int[np.ndarray, " distinct"]:
+    """States that no earlier one is the same as."""
+    u = z[:, : structure.unknowns] * np.sqrt(structure.mass)
+    return np.flatnonzero(~np.tril(cdist(u, u) <= SAME_STATE, -1).any(axis=1))

@@ -23,9 +23,10 @@ from equimorph.columns import Columns
 from equimorph.equilibria.critical import Critical, null_border
 from equimorph.equilibria.newton_step import Planes
 from equimorph.equilibria.point_conditions import Plane
-from equimorph.equilibria.settle import Guards, settle
-from equimorph.manifold.geometry.exact_points import Aim, Pinned, corrected, lower_index
+from equimorph.equilibria.settle import Guards, lower_index, settle
+from equimorph.manifold.geometry.exact_points import Aim, Pinned, corrected
 from equimorph.manifold.geometry.setting import Setting, embed
+from equimorph.manifold.geometry.simplices import shares_in
 from equimorph.manifold.geometry.topology import adjacency, keys_of, rows_of
 from equimorph.manifold.lookup.cell_index import Hits
 from equimorph.structures import States
@@ -175,7 +176,7 @@ class NearCrossings:
         size = np.sqrt(v[:, : structure.unknowns] ** 2 @ structure.mass)
         r = np.einsum("li,li->l", v, structure.residual(z, own))
         r[np.abs(r) <= ROUND_OFF] = 0.0
-        return Centres(z, own, b, size, r, lower_index(self.setting, z, own), at)
+        return Centres(z, own, b, size, r, lower_index(self.setting.structure, z, own), at)
 
     def branches(self, centres: Centres, p: Parameters) -> tuple[Branches, Centres]:
         """All states over points whose amplitude from their crossing points is at most `WIDE`.
@@ -315,10 +316,5 @@ def _nearest_weights(
     place: Float[np.ndarray, "lanes k d"], at: Float[np.ndarray, "lanes d"]
 ) -> Float[np.ndarray, "lanes k"]:
     """Barycentric coordinates, in facets, of the points of their planes next to given ones."""
-    sides = place[:, 1:] - place[:, :1]
-    gram = sides @ np.swapaxes(sides, 1, 2)
-    along = np.einsum("lkd,ld->lk", sides, at - place[:, 0])
-    share = np.einsum("lij,lj->li", np.linalg.pinv(gram), along)
-    weights = np.concatenate([1.0 - share.sum(axis=1, keepdims=True), share], axis=1)
-    weights = np.clip(weights, 0.0, 1.0)
+    weights = np.clip(shares_in(place, at), 0.0, 1.0)
     return np.asarray(weights / weights.sum(axis=1, keepdims=True))

@@ -9,7 +9,6 @@ from functools import cached_property, partial
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
-from scipy.spatial.distance import cdist
 
 from equimorph.arrays import Flags, Lanes
 from equimorph.linalg.lanes import in_background, threads
@@ -19,6 +18,7 @@ from equimorph.manifold.lookup.exact_states import (
     CLOSEST,
     Points,
     exact_states,
+    first_of_same,
     lift_to,
     nearest_pairs,
     turned_back,
@@ -30,7 +30,7 @@ from equimorph.manifold.lookup.kernels import (
     worth_trying,
 )
 from equimorph.manifold.lookup.near_crossings import NearCrossings
-from equimorph.model import Constraint
+from equimorph.model import Constraint, are_feasible
 from equimorph.structures import States, Structure
 from equimorph.tolerances import SAME_SOLUTION, SAME_STATE
 
@@ -185,7 +185,7 @@ class Sheets:
         centres = crossings.centres(close, p)
         branches, centres = crossings.branches(centres, p)
         own = np.isin(branches.index, self.cell_index)
-        own &= self._admissible(branches.z, p[branches.point])
+        own &= are_feasible(self.constraints, branches.z, p[branches.point])
         of_own = (branches.z[own], branches.point[own], branches.index[own])
         kept = ~crossings.on_branches(centres, p, z, point)
         parts = [(z[kept], point[kept], cell[kept])]
@@ -237,7 +237,7 @@ class Sheets:
             found = found[sure[hits.point[found]]]
             doubtful = near.take(~sure[near.point])
             doubtful = replace(doubtful, point=first + doubtful.point)
-        kept = found[self._admissible(z[found], at[found])]
+        kept = found[are_feasible(self.constraints, z[found], at[found])]
         return (z[kept], first + hits.point[kept], hits.cell[kept]), doubtful
 
     def _near(self, x: Float[np.ndarray, "points d"]) -> Hits:
@@ -281,12 +281,6 @@ class Sheets:
             np.maximum(longest, (u[corner] - first) ** 2 @ self.structure.mass, out=longest)
         return 2.0 * np.sqrt(longest) + SAME_STATE
 
-    def _admissible(self, z: Lanes, p: Points) -> Bool[np.ndarray, " n"]:
-        good = np.ones(len(z), bool)
-        for constraint in self.constraints:
-            good &= constraint.excess(z, p) <= 0.0
-        return good
-
     def _search(self, p: Points, near: Hits) -> Iterator[Found]:
         """States over points by lifts and Newton from all regular vertices near each of them."""
         guess = self._guess(near)
@@ -326,7 +320,7 @@ class Sheets:
         """Different states over each point, those points, sorted, and the index."""
         lanes = [np.flatnonzero(point == number) for number in np.unique(point)]
         kept = np.concatenate(
-            [own[_firsts(self.structure, z[own])] for own in lanes] or [np.zeros(0, int)]
+            [own[first_of_same(self.structure, z[own])] for own in lanes] or [np.zeros(0, int)]
         )
         index = self.structure.index(z[kept], p[point[kept]])
         # lifts from parts of sets leave them across folds
@@ -380,7 +374,7 @@ class Sheets:
         unresolved = np.zeros(len(p), bool)
         unresolved[near.point[self._unresolved[near.cell]]] = True
         good = self.structure.resolved(z, p[owner]) | unresolved[owner]
-        good &= self._admissible(z, p[owner])
+        good &= are_feasible(self.constraints, z, p[owner])
         return z[good], owner[good]
 
     def _nearest(
@@ -395,9 +389,3 @@ class Sheets:
         best = gap.argmin(axis=1)
         near = np.isfinite(gap[np.arange(len(z)), best])
         return np.where(near, mine.cell[best], -1)
-
-
-def _firsts(structure: Structure, z: Lanes) -> Int[np.ndarray, " distinct"]:
-    """States that no earlier one is the same as."""
-    u = z[:, : structure.unknowns] * np.sqrt(structure.mass)
-    return np.flatnonzero(~np.tril(cdist(u, u) <= SAME_STATE, -1).any(axis=1))

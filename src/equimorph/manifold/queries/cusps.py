@@ -8,12 +8,12 @@ from jaxtyping import Bool, Float, Int
 from equimorph.argument_checks import check_arguments
 from equimorph.equilibria.critical import Critical, null_border
 from equimorph.equilibria.locus import Locus, nearest
+from equimorph.equilibria.settle import lower_index
 from equimorph.errors import InputError
 from equimorph.manifold.complex.cuts import roots
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.manifold.complex.marked_complex import Fabric, FacetMark, fabric_of
 from equimorph.manifold.complex.vertices import Vertices
-from equimorph.manifold.geometry.exact_points import lower_index
 from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.setting import Setting, embed
 from equimorph.structures import States
@@ -115,7 +115,7 @@ def _between(
             continue
         z, p = locus.split(spot.x)
         away = np.linalg.norm(embed(setting, z, p) - store.place[edge], axis=1)
-        if away.max() <= REACH * length and lower_index(setting, z, p)[0] == low:
+        if away.max() <= REACH * length and lower_index(setting.structure, z, p)[0] == low:
             return z[0], p[0]
     return None
 

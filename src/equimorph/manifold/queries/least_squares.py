@@ -16,6 +16,7 @@ from equimorph.columns import Columns
 from equimorph.manifold.geometry.setting import Setting
 from equimorph.manifold.geometry.tangents import cap_slopes, placed_frames, split_step
 from equimorph.manifold.queries.nearest import Frames, Ground, SetPoints, free_steps
+from equimorph.model import worst_excess
 
 Residuals = Callable[[Lanes, Parameters], Float[np.ndarray, "lanes m"]]
 Steps = Float[np.ndarray, "lanes k"]
@@ -151,7 +152,7 @@ class _Descent:
         room = np.full(len(spot.z), np.inf)
         if not setting.constraints or move.step.shape[1] == 0:
             return room
-        excess = np.max([each.excess(spot.z, spot.p) for each in setting.constraints], axis=0)
+        excess = worst_excess(setting.constraints, spot.z, spot.p)
         slopes = cap_slopes(setting, spot.z, spot.p, move.frames)
         rise = np.einsum("lk,lk->l", slopes, move.step)
         rising = rise > 1e-9 * np.abs(slopes).max(axis=1) * np.abs(move.step).max(axis=1)

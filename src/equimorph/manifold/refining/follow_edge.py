@@ -17,6 +17,7 @@ from equimorph.equilibria.trace_options import TraceOptions
 from equimorph.manifold.complex.marked_complex import Fabric, FacetMark
 from equimorph.manifold.complex.vertices import Vertices, vertices_of
 from equimorph.manifold.geometry.points import CAP, CROSSING, FOLD
+from equimorph.model import worst_excess
 from equimorph.tolerances import IN_BOX
 
 FIRST, LEAST = 0.25, 1e-3
@@ -61,8 +62,7 @@ def _excess(fabric: Fabric) -> Test:
     """Largest excess over the constraints."""
 
     def test(at: Critical) -> Values:
-        excess = [each.excess(at.z, at.p) for each in fabric.setting.constraints]
-        return np.asarray(np.max(excess, axis=0))
+        return worst_excess(fabric.setting.constraints, at.z, at.p)
 
     return test
 

@@ -12,6 +12,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from equimorph.arrays import Edges
+from equimorph.equilibria.settle import lower_index
 from equimorph.manifold.complex.edge_points import chunks
 from equimorph.manifold.complex.marked_complex import (
     TRIANGLES,
@@ -23,7 +24,7 @@ from equimorph.manifold.complex.marked_complex import (
 )
 from equimorph.manifold.complex.shared_edges import copies
 from equimorph.manifold.complex.vertices import Vertices, vertices_of
-from equimorph.manifold.geometry.exact_points import Aim, corrected, lower_index
+from equimorph.manifold.geometry.exact_points import Aim, corrected
 from equimorph.manifold.geometry.points import CAP, CORNER, FOLD, REFINED
 from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.geometry.tangents import split_step
@@ -248,7 +249,7 @@ def _at_better_places(
     found &= ((free >= fabric.box[0]) & (free <= fabric.box[1])).all(axis=1)
     index = store.index[chosen]
     states = pinned.z[found], pinned.p[found]
-    counted = lower_index(setting, *states) if fold else setting.structure.index(*states)
+    counted = lower_index(setting.structure, *states) if fold else setting.structure.index(*states)
     found[found] = counted == index[found]
     kind = {(False, False): REFINED, (True, False): FOLD, (False, True): CAP, (True, True): CORNER}
     some = int(found.sum())

@@ -256,7 +256,7 @@ def _extrema_met(
     p: Parameters,
 ) -> Values:
     """Number of the constraint that was met, plus where on the structure its extremum lies."""
-    excess = np.array([c.excess(z, p) / max(1.0, abs(c.bound)) for c in within])
+    excess = np.array([c.excess(z, p) / c.size for c in within])
     which = excess.argmax(axis=0)
     place: Values = 2.0 * which
     for k, constraint in enumerate(within):

@@ -8,7 +8,7 @@ from jaxtyping import Float, Int
 
 from equimorph.equilibria import Event, EventKind, Leg, Path, TraceOptions, lift
 from equimorph.equilibria.settle import distances
-from equimorph.model import Constraint, Descriptor, names_of
+from equimorph.model import Constraint, Descriptor, are_feasible, names_of
 from equimorph.structures import State, States
 from equimorph.tasks.distances import path_lengths, step_lengths
 from equimorph.tasks.motion.course import (
@@ -149,8 +149,7 @@ def _block(
     states = States(structure, found.z[:count], found.p[:count])
     if count:
         fine = states.index == 0
-        for constraint in within:
-            fine &= constraint.excess(states.z, states.p) <= 0.0
+        fine &= are_feasible(within, states.z, states.p)
         states = states[: _leading(fine)]
     return Stretch(states, ahead[: len(states)])
 

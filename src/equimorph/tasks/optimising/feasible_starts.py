@@ -108,9 +108,7 @@ def _excesses(
 ) -> Float[np.ndarray, "K V"]:
     """Relative excess over bounds at the vertices."""
     rows = [
-        (1.0 if c.sense == "<=" else -1.0)
-        * (vertex_values(eset, c.descriptor) - c.bound)
-        / max(1.0, abs(c.bound))
+        (1.0 if c.sense == "<=" else -1.0) * (vertex_values(eset, c.descriptor) - c.bound) / c.size
         for c in constraints
     ]
     return np.array(rows).reshape(len(constraints), len(eset.points))
@@ -237,7 +235,7 @@ def _largest(constraints: tuple[Constraint, ...]) -> Descriptor:
     """Largest relative excess, with all as branches."""
 
     def each(z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes K"]:
-        return np.stack([c.excess(z, p) / max(1.0, abs(c.bound)) for c in constraints], axis=1)
+        return np.stack([c.excess(z, p) / c.size for c in constraints], axis=1)
 
     return Descriptor(
         "excess",

@@ -15,7 +15,7 @@ from equimorph.equilibria.trace_options import EventCode
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet, StatesOver
 from equimorph.manifold.queries.locate import pieces_of
-from equimorph.model import Constraint, Descriptor, Grid
+from equimorph.model import Constraint, Descriptor, Grid, worst_relative_excess
 from equimorph.structures import State, States
 from equimorph.tasks.maps.actuator_map import settings_of
 from equimorph.tasks.maps.brackets import grid_edges
@@ -159,9 +159,7 @@ def _admissible(
 ) -> Flags:
     """Stable states that obey the constraints, on the piece of the start."""
     good = over.index == 0
-    for constraint in within:
-        room = OVER * max(1.0, abs(constraint.bound))
-        good &= constraint.excess(over.states.z, over.states.p) <= room
+    good &= worst_relative_excess(within, over.states.z, over.states.p) <= OVER
     if start is not None:
         good &= over.stratum == pieces_of(eset, start)[0]
     return np.asarray(good)

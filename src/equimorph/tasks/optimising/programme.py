@@ -161,7 +161,7 @@ class Programme:
 
     def excess(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes k"]:
         """Excess over all bounds, relative to these."""
-        each = [c.excess(z, p) / max(1.0, abs(c.bound)) for c in self.all]
+        each = [c.excess(z, p) / c.size for c in self.all]
         return np.stack(each, axis=1)
 
     def expand(self, at: SetPoints, frames: Frames) -> Expansion:

@@ -15,7 +15,7 @@ from equimorph.equilibria.trace import Traces, trace
 from equimorph.equilibria.trace_options import EventCode
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.geometry.topology import faces_of
-from equimorph.model import Constraint, eased
+from equimorph.model import Constraint, are_feasible, eased
 from equimorph.structures import State, States, Structure, join_states
 from equimorph.tasks.planning.objectives import ROUGH, Objective, Wish, objective_of
 from equimorph.tasks.route import FINE
@@ -89,8 +89,7 @@ class Demands:
         shift = np.full(len(states), self.margin)
         count = structure.solve(states.z, states.p, nothing, shift=shift).negative
         good = np.asarray(count == structure.constraints)
-        for constraint in self.constraints:
-            good[good] = constraint.excess(states.z[good], states.p[good]) <= 0.0
+        good[good] = are_feasible(self.constraints, states.z[good], states.p[good])
         return good
 
 

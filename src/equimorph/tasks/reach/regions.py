@@ -201,5 +201,5 @@ def _active_constraint(eset: EquilibriumSet, facet: Int[np.ndarray, " d"]) -> tu
         return "open", ""
     gaps = [np.abs(each.excess(states.z, states.p)).max() for each in eset.constraints]
     worst = int(np.argmin(gaps))
-    active = gaps[worst] <= 1e-6 * max(1.0, abs(eset.constraints[worst].bound))
+    active = gaps[worst] <= 1e-6 * eset.constraints[worst].size
     return ("constraint", str(eset.constraints[worst])) if active else ("open", "")

@@ -14,7 +14,7 @@ from equimorph.arrays import Values
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet, Level
 from equimorph.manifold.queries.nearest import SetPoints, local_minima, points_at_vertices
-from equimorph.model import NOT_KEPT, Constraint, Descriptor, Schedule
+from equimorph.model import NOT_KEPT, Constraint, Descriptor, Schedule, worst_relative_excess
 from equimorph.structures import State, States
 from equimorph.tasks.distances import distinct
 from equimorph.tasks.optimising.programme import stability
@@ -300,9 +300,7 @@ def _solve(
         found, owner = np.concatenate([found, twins.found])[order], owner[order]
     found &= eset.box.holds(p[:, known.setting.free], slack=AT_EDGE)
     found[found] &= structure.resolved(z[found], p[found])
-    for constraint in within:
-        room = AT_EDGE * max(1.0, abs(constraint.bound))
-        found[found] &= constraint.excess(z[found], p[found]) <= room
+    found[found] &= worst_relative_excess(within, z[found], p[found]) <= AT_EDGE
     states = States(structure, z[found], p[found])
     owner = owner[found]
     bounds = np.searchsorted(owner, np.arange(len(targets) + 1))
