@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import equimorph as em
-from equimorph.equilibria import arguments, random_search
+from equimorph.equilibria import minima_graph, random_search
 from equimorph.equilibria.minima_graph import MinimaGraph
 from equimorph.equilibria.random_search import Ground
 from oracles.close_states import close_roots, close_sheets, truss_row
@@ -51,7 +51,7 @@ def test_no_row_lacks_a_stable_state(count, seed):
 
 def test_arguments_say_where_pushes_were_left_out(monkeypatch):
     """Over points with very many states, like an unloaded dome with 1644, they take too long."""
-    for module in (arguments, random_search):
+    for module in (minima_graph, random_search):
         monkeypatch.setattr(module, "PUSHED", 3)
     found = em.find_equilibria(close_sheets(0.1), AT)
     (told,) = (each for each in found.arguments if each.name == "pushes")

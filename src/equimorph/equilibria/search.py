@@ -12,9 +12,8 @@ from jaxtyping import Bool, Float, Int
 from scipy.special import gammaln, xlogy
 
 from equimorph.argument_checks import check_arguments
-from equimorph.equilibria.arguments import Argument, arguments_of, contradicts
 from equimorph.equilibria.legs import check_isolated
-from equimorph.equilibria.minima_graph import MinimaGraph
+from equimorph.equilibria.minima_graph import Argument, MinimaGraph, arguments_of, contradicts
 from equimorph.equilibria.random_search import BEYOND, UNRESOLVED, Ground, Pools, distinct
 from equimorph.model import Constraint, parameter_vector
 from equimorph.structures import States, Structure

@@ -18,12 +18,11 @@ from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.manifold.complex.kept_sets import Effort, question_of_set, recall_set
 from equimorph.manifold.geometry.setting import Setting
 from equimorph.manifold.lifting.cells import CellFinder, Cells, account
-from equimorph.manifold.lifting.completeness import check
+from equimorph.manifold.lifting.completeness import check, longest, off_zero, recover
 from equimorph.manifold.lifting.crossing_branches import flood_crossings
 from equimorph.manifold.lifting.flood import flood
 from equimorph.manifold.lifting.grid import Lines, bisect, coarse_grid, grid_lines, grid_mesh
 from equimorph.manifold.lifting.pairing import Pairing, start_pairing
-from equimorph.manifold.lifting.recovery import longest, off_zero, recover
 from equimorph.manifold.lifting.seeds import Seeds, is_symmetric, seeds
 from equimorph.manifold.lifting.unseen import UnseenFinder
 from equimorph.manifold.refining.refine import refine_cells

@@ -20,13 +20,14 @@ from equimorph.model.drawing import (
     Support,
     SupportKind,
 )
-from equimorph.model.function_content import content_of_descriptor, content_of_function
 from equimorph.model.journal import (
     NOT_KEPT,
     Findings,
     Journal,
     Progress,
     Silent,
+    content_of_descriptor,
+    content_of_function,
     recalled,
 )
 from equimorph.model.obstacle import Disc, HalfPlane, Obstacle
@@ -39,8 +40,7 @@ from equimorph.model.parameter import (
     parameter_vector,
     position,
 )
-from equimorph.model.rates import Rates
-from equimorph.model.schedule import Schedule
+from equimorph.model.schedule import Rates, Schedule
 from equimorph.model.spline import Spline
 
 __all__ = [

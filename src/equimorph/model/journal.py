@@ -1,15 +1,30 @@
 """Sinks that long computations are given: progress reports, journals; and what files leave out.
 
 A deterministic computation asks the same questions in the same order each time. It hands each
-answer to a journal; begun again with that journal, it is given the answers back.
+answer to a journal; begun again with that journal, it is given the answers back. What depends on a
+function of the user is identified by what the function does.
 """
 
+import functools
+import hashlib
+import sys
 from collections.abc import Callable, Mapping
-from types import MappingProxyType
-from typing import Protocol, TypeAlias, runtime_checkable
+from dataclasses import fields, is_dataclass
+from types import (
+    BuiltinFunctionType,
+    CodeType,
+    FunctionType,
+    MappingProxyType,
+    MethodType,
+    ModuleType,
+)
+from typing import Any, Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
 from jaxtyping import Shaped
+
+from equimorph.errors import InputError
+from equimorph.model.descriptor import Descriptor
 
 Findings: TypeAlias = tuple[Shaped[np.ndarray, "..."], ...]
 """Arrays of numbers that a step has found."""
@@ -61,3 +76,214 @@ class Silent:
 
 NOT_KEPT: Mapping[str, bool] = MappingProxyType({"kept": False})
 """Metadata of a dataclass's field that files leave out; it needs a default."""
+
+
+PLUMBING = frozenset(
+    ("__dict__", "__weakref__", "__module__", "__qualname__", "__doc__", "__annotations__",
+     "__firstlineno__", "__static_attributes__", "__dataclass_fields__", "__dataclass_params__")
+)  # fmt: skip
+"""What Python puts into every class."""
+
+
+def content_of_function(function: Callable[..., Any], name: str) -> str:
+    """Fingerprint of all that a function computes with.
+
+    Parameters
+    ----------
+    function
+        A function, method, partial, or object of data with a ``__call__``.
+    name
+        Of what is identified, for the message.
+
+    Raises
+    ------
+    InputError
+        If it holds something without known content, like an open file.
+
+    Examples
+    --------
+    >>> half, third = (lambda x, k=k: x / k for k in (2, 3))
+    >>> content_of_function(half, "half") == content_of_function(third, "third")
+    False
+    """
+    return hashlib.sha256(repr(_Contents(name).of(function)).encode()).hexdigest()
+
+
+def content_of_descriptor(descriptor: Descriptor) -> str:
+    """Fingerprint of a descriptor that a user made; see `content_of_function`."""
+    return content_of_function(descriptor.function, descriptor.name)
+
+
+class _Contents:
+    """Contents of values as nested tuples of texts; repeated values are described once."""
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+        self._met: dict[int, int] = {}
+        self._alive: list[Any] = []  # an id stands for one object only while that lives
+
+    def of(self, value: Any) -> Any:
+        if value is None or isinstance(value, bool | int | float | complex | str | bytes):
+            return type(value).__name__, repr(value)
+        if value is Ellipsis or isinstance(value, range | slice | np.dtype):
+            return "constant", repr(value)
+        if id(value) in self._met:
+            return "again", self._met[id(value)]
+        self._met[id(value)] = len(self._met)
+        self._alive.append(value)
+        return self._inside(value)
+
+    @functools.singledispatchmethod
+    def _inside(self, value: Any) -> Any:
+        """Contents of values that are no plain data: by their identity, code or state."""
+        if callable(getattr(value, "identity", None)):  # structures say what they are
+            return "identity", type(value).__name__, self.of(value.identity())
+        if callable(getattr(value, "serialize", None)):  # symbolic functions, too
+            return "serialised", type(value).__name__, value.serialize()
+        wrapped = getattr(value, "py_func", None) or getattr(value, "__wrapped__", None)
+        if wrapped is not None:  # compiled, or decorated
+            return "wrapped", type(value).__qualname__, self.of(wrapped)
+        return self._fields(value)
+
+    def _fields(self, value: Any) -> Any:
+        """Contents of an object by its fields, and the methods of its class."""
+        kind = type(value)
+        if is_dataclass(kind):
+            inside = {each.name: getattr(value, each.name) for each in fields(kind)}
+        elif isinstance(getattr(value, "__dict__", None), dict) and _is_written_here(kind):
+            inside = vars(value)
+        else:
+            raise InputError(
+                f"`{self._name}` must be computed from numbers, texts, arrays and functions of "
+                "them, by which a journal tells it from others of its name; got "
+                f"{_article(kind.__name__)}. Compute without a journal."
+            )
+        return "object", kind.__qualname__, self._methods(kind), self.of(inside)
+
+    @_inside.register
+    def _(self, value: np.ndarray | np.generic) -> Any:
+        return self._array(np.asarray(value))
+
+    @_inside.register(tuple)
+    @_inside.register(list)
+    def _(self, value: Any) -> Any:
+        return type(value).__name__, *map(self.of, value)
+
+    @_inside.register(set)
+    @_inside.register(frozenset)
+    def _(self, value: Any) -> Any:
+        return "set", *sorted(repr(_Contents(self._name).of(each)) for each in value)
+
+    @_inside.register(Mapping)
+    def _(self, value: Any) -> Any:
+        return "mapping", *((self.of(key), self.of(each)) for key, each in value.items())
+
+    @_inside.register
+    def _(self, value: ModuleType) -> Any:
+        return "module", value.__name__, _release(value.__name__)
+
+    @_inside.register
+    def _(self, value: type) -> Any:
+        return "class", _module_of(value), value.__qualname__, self._methods(value)
+
+    @_inside.register
+    def _(self, value: MethodType) -> Any:
+        return "method", self.of(value.__func__), self.of(value.__self__)
+
+    @_inside.register(functools.partial)
+    def _(self, value: Any) -> Any:
+        return "partial", *map(self.of, (value.func, value.args, value.keywords))
+
+    @_inside.register
+    def _(self, value: BuiltinFunctionType | np.ufunc) -> Any:
+        name = getattr(value, "__qualname__", value.__name__)
+        return "built in", _module_of(value), name, self.of(_owner_of(value))
+
+    def _array(self, array: Any) -> Any:
+        if array.dtype.kind == "O":
+            return "objects", array.shape, *map(self.of, array.ravel().tolist())
+        check = hashlib.sha256(np.ascontiguousarray(array).tobytes()).hexdigest()
+        return "array", array.dtype.str, array.shape, check
+
+    def _methods(self, kind: type) -> Any:
+        """What classes define, those below too, unless a release stands for them."""
+        if not _is_written_here(kind):
+            return _release(kind.__module__)
+        return tuple(
+            (name, self.of(getattr(each, "__func__", getattr(each, "fget", each))))
+            for base in kind.__mro__ if _is_written_here(base)
+            for name, each in vars(base).items() if name not in PLUMBING
+        )  # fmt: skip
+
+    @_inside.register
+    def _function(self, function: FunctionType) -> Any:
+        release = _release(function.__module__)
+        closed = [self.of(cell.cell_contents) for cell in function.__closure__ or () if _full(cell)]
+        given = self.of(function.__defaults__), self.of(function.__kwdefaults__)
+        if release is not None:
+            return "function", function.__module__, function.__qualname__, release, closed, given
+        code = function.__code__
+        named = [(name, self._global_content(name, function, code)) for name in _names(code)]
+        return "function", self._code(code), named, closed, given
+
+    def _global_content(self, name: str, function: FunctionType, code: CodeType) -> Any:
+        """Global that a function names, with the attributes of modules that it may take."""
+        if name not in function.__globals__:
+            return None
+        value = function.__globals__[name]
+        if not isinstance(value, ModuleType) or _release(value.__name__) is not None:
+            return self.of(value)
+        taken = [each for each in _names(code) if each in vars(value)]
+        return "module", value.__name__, *((each, self.of(vars(value)[each])) for each in taken)
+
+    def _code(self, code: CodeType) -> Any:
+        constants = [
+            self._code(each) if isinstance(each, CodeType) else self.of(each)
+            for each in code.co_consts
+        ]
+        return code.co_code.hex(), constants, code.co_names, code.co_varnames, code.co_freevars
+
+
+def _names(code: CodeType) -> list[str]:
+    """Names that code uses, and code inside it."""
+    inner = [name for each in code.co_consts if isinstance(each, CodeType) for name in _names(each)]
+    return sorted({*code.co_names, *inner})
+
+
+def _release(module: str | None) -> str | None:
+    """Release that stands for the content of a module; None for modules that a user may edit."""
+    top = (module or "").partition(".")[0]
+    if top in sys.stdlib_module_names and top != "__main__":
+        return sys.version
+    if top == "equimorph" or "site-packages" in (
+        getattr(sys.modules.get(top), "__file__", "") or ""
+    ):
+        return str(getattr(sys.modules.get(top), "__version__", "")) or None
+    return None
+
+
+def _is_written_here(kind: type) -> bool:
+    return _release(kind.__module__) is None
+
+
+def _module_of(value: Any) -> str:
+    module = getattr(value, "__module__", None) or type(value).__module__
+    return f"{module} {_release(module)}"
+
+
+def _owner_of(value: Any) -> Any:
+    """Object of a method that is built in, like that of a list; nothing for functions."""
+    owner = getattr(value, "__self__", None)
+    return None if isinstance(owner, ModuleType) else owner
+
+
+def _full(cell: Any) -> bool:
+    try:
+        cell.cell_contents  # noqa: B018  # raises if the cell is empty
+    except ValueError:
+        return False
+    return True
+
+
+def _article(word: str) -> str:
+    return f"an {word}" if word[:1] in "aeiouAEIOU" else f"a {word}"

@@ -1,4 +1,4 @@
-"""Tangent spaces of the set at its vertices, and how far straight edges are from it."""
+"""Tangent spaces of the set at its vertices, folds to second order, and how far edges are off."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -14,6 +14,7 @@ from equimorph.equilibria.newton_step import free_directions, weights_of
 from equimorph.equilibria.point_conditions import second_derivatives
 from equimorph.linalg import orthonormal_rows
 from equimorph.manifold.geometry.kernels import square_sides
+from equimorph.manifold.geometry.points import Points
 from equimorph.manifold.geometry.setting import Setting, embed
 from equimorph.model import worst_excess
 
@@ -210,3 +211,38 @@ def _breadths(
         cosines /= np.sqrt(own[:, :, None] * own[:, None, :])
         out[:, k] = np.linalg.det(cosines)
     return out
+
+
+@dataclass(frozen=True)
+class FoldForms:
+    """Coefficients of ``φᵀF_p δp + ½ φᵀF_zz[φ, φ] ξ² = 0``, the set near folds.
+
+    null: φ, of either sign; slope: φᵀF_p along the scaled free parameters; bend: φᵀF_zz[φ, φ].
+    """
+
+    null: Lanes
+    slope: Float[np.ndarray, "n d"]
+    bend: Values
+
+    @property
+    def existence(self) -> Float[np.ndarray, "n d"]:
+        """Vectors, in scaled free parameters, towards the side of a fold where sheets exist.
+
+        They are continuous along a fold and turn round only at a cusp.
+        """
+        return np.asarray(-self.slope * np.sign(self.bend)[:, None])
+
+
+def fold_forms(setting: Setting, points: Points, folds: Int[np.ndarray, " n"]) -> FoldForms:
+    """Coefficients at points on folds."""
+    structure, free = setting.structure, setting.free
+    z, p = points.z[folds], points.p[folds]
+    phi = null_border(structure, z, p)
+    none = np.zeros_like(p)
+    bend = np.einsum("li,li->l", phi, structure.second_derivative(z, p, (phi, none), (phi, none)))
+    slope = np.empty((len(folds), len(free)))
+    for k in range(len(free)):
+        dp = np.zeros_like(p)
+        dp[:, free[k]] = setting.scales[k]
+        slope[:, k] = np.einsum("li,li->l", phi, structure.parameter_derivative(z, p, dp))
+    return FoldForms(phi, slope, bend)

@@ -21,14 +21,15 @@ from equimorph.manifold.geometry.simplices import shares_in, volumes
 from equimorph.manifold.geometry.topology import distinct
 from equimorph.manifold.lifting.discs import Discs
 from equimorph.manifold.lifting.pairing import Pairing
-from equimorph.manifold.lifting.sphere_regions import (
+from equimorph.manifold.lifting.spheres import (
     Parts,
+    Surfaces,
     closed_surfaces,
     fans_of,
+    find_spheres,
     part,
     upright_apexes,
 )
-from equimorph.manifold.lifting.spheres import Surfaces, find_spheres
 
 SHARES = (0.25, 0.5, 0.8, 0.95)
 """Fractions between centroid and member used as retry starting points. Of 10 600 points inside

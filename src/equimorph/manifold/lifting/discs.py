@@ -8,6 +8,7 @@ from jaxtyping import Bool, Float, Int
 from equimorph.manifold.geometry.exact_points import pin
 from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.setting import embed
+from equimorph.manifold.geometry.tangents import fold_forms
 from equimorph.manifold.geometry.topology import flags_of
 from equimorph.manifold.lifting.crossing_branches import lonely
 from equimorph.manifold.lifting.crossing_discs import (
@@ -18,7 +19,6 @@ from equimorph.manifold.lifting.crossing_discs import (
     put_hubs,
     split_crossings,
 )
-from equimorph.manifold.lifting.fold_forms import fold_forms
 from equimorph.manifold.lifting.loops import Loops, Polygon
 from equimorph.manifold.lifting.pairing import Pairing
 from equimorph.manifold.lifting.polygon_cuts import (

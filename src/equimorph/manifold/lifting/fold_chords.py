@@ -16,8 +16,8 @@ from equimorph.columns import Columns
 from equimorph.manifold.geometry.exact_points import pin
 from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.simplices import shares_in
+from equimorph.manifold.geometry.tangents import fold_forms
 from equimorph.manifold.lifting.cells import Cells
-from equimorph.manifold.lifting.fold_forms import fold_forms
 from equimorph.manifold.lifting.pairing import Pairing
 from equimorph.manifold.lifting.polygon_cuts import chord_of, planes
 from equimorph.manifold.lifting.stationary_points import Starts

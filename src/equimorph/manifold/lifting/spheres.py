@@ -1,14 +1,18 @@
-"""Connected surfaces that the discs over the faces of each grid tetrahedron form."""
+"""Connected surfaces that the discs over the faces of each grid tetrahedron form.
+
+And the regions of closed ones between folds, with the points from which they are coned.
+"""
 
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Int
+from jaxtyping import Bool, Float, Int
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from equimorph.manifold.complex.base_mesh import BaseMesh
-from equimorph.manifold.geometry.topology import keys_of, labels
+from equimorph.manifold.geometry.simplices import volumes
+from equimorph.manifold.geometry.topology import adjacency, distinct, keys_of, labels, orientation
 from equimorph.manifold.lifting.discs import Discs
 
 
@@ -175,3 +179,211 @@ def _pieces(
     graph = coo_array((np.ones(len(a)), (a, b)), shape=(len(owner), len(owner)))
     _, piece = connected_components(graph, directed=False)
     return counts[inverse].reshape(-1, 3), piece
+
+
+@dataclass(frozen=True)
+class Closed:
+    """Triangles of closed surfaces: some with a lid on the constraint.
+
+    corners, index, surface, lid: of the triangles; met: which of their sides ab, bc, ca lie where
+    another sheet crosses; owner, cap: of the surfaces, their grid
+    tetrahedron, and the point from which the lid was drawn (−1 if there is none).
+    """
+
+    corners: Int[np.ndarray, "n 3"]
+    index: Int[np.ndarray, " n"]
+    surface: Int[np.ndarray, " n"]
+    lid: Bool[np.ndarray, " n"]
+    met: Bool[np.ndarray, "n 3"]
+    owner: Int[np.ndarray, " S"]
+    cap: Int[np.ndarray, " S"]
+
+
+@dataclass(frozen=True)
+class Parts:
+    """How closed surfaces are parted.
+
+    region: of each triangle; region_surface, region_index, first_curve: of the regions, one of the
+    curves around it (−1 if there is none); folds, curve, beside: sides between two indices, or
+    where another sheet crosses, the closed curve that they belong to, and the regions on both
+    sides; curve_surface, curve_met: of the curves, the surface and whether another sheet crosses;
+    whole: surfaces that are spheres, parted without contradiction.
+    """
+
+    closed: Closed
+    region: Int[np.ndarray, " n"]
+    region_surface: Int[np.ndarray, " regions"]
+    region_index: Int[np.ndarray, " regions"]
+    first_curve: Int[np.ndarray, " regions"]
+    folds: Int[np.ndarray, "f 2"]
+    curve: Int[np.ndarray, " f"]
+    beside: Int[np.ndarray, "f 2"]
+    curve_surface: Int[np.ndarray, " curves"]
+    curve_met: Bool[np.ndarray, " curves"]
+    whole: Bool[np.ndarray, " S"]
+
+
+def closed_surfaces(
+    surfaces: Surfaces,
+    caps: Int[np.ndarray, " S"],
+    wanted: Bool[np.ndarray, " S"],
+    crossing: Bool[np.ndarray, " points"],
+) -> Closed:
+    """Close surfaces along their rims: from a cap, maybe on the rim, or by one triangle.
+
+    `crossing` flags the points that are crossings: between two of them, lids are met.
+    """
+    number = np.cumsum(wanted) - 1
+    own, rim = wanted[surfaces.surface], wanted[surfaces.rim_surface]
+    rim &= (surfaces.rims != caps[surfaces.rim_surface, None]).all(axis=1)
+    at, sides, index = surfaces.rim_surface[rim], surfaces.rims[rim], surfaces.rim_index[rim]
+    capped = caps[at] >= 0
+    fans = np.concatenate([np.sort(sides[capped], axis=1), caps[at[capped], None]], axis=1)
+    # rims without a cap have three sides, one after the other
+    order = np.flatnonzero(~capped)[np.argsort(at[~capped], kind="stable")]
+    first, second = order[::3], order[1::3]
+    third = np.where(
+        (sides[second] == sides[first, :1]) | (sides[second] == sides[first, 1:]), -1, sides[second]
+    ).max(axis=1)
+    triangles = np.concatenate([sides[first], third[:, None]], axis=1)
+    lids = np.concatenate([fans, triangles])
+    return Closed(
+        np.concatenate([surfaces.corners[own], lids]),
+        np.concatenate([surfaces.index[own], index[capped], index[first]]),
+        number[np.concatenate([surfaces.surface[own], at[capped], at[first]])],
+        np.arange(own.sum() + len(lids)) >= own.sum(),
+        np.concatenate([surfaces.met[own], _sides_on_crossings(lids, crossing)]),
+        surfaces.owner[wanted],
+        caps[wanted],
+    )
+
+
+def _sides_on_crossings(
+    corners: Int[np.ndarray, "n 3"], crossing: Bool[np.ndarray, " points"]
+) -> Bool[np.ndarray, "n 3"]:
+    """Which sides ab, bc, ca of lids join two crossings."""
+    at = crossing[corners]
+    return np.asarray(at & np.roll(at, -1, axis=1))
+
+
+def part(closed: Closed) -> Parts:
+    """Part closed surfaces along the sides at which the index jumps."""
+    corners, index, surface = closed.corners, closed.index, closed.surface
+    count = len(closed.owner)
+    base = int(corners.max(initial=0)) + 1
+    sides = np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]], corners[:, [2, 0]]])
+    triangle = np.tile(np.arange(len(corners)), 3)
+    order = np.lexsort([keys_of(sides, base), surface[triangle]])
+    # on a closed surface every side has two triangles, one after the other
+    first, second = order[::2], order[1::2]
+    pairs = triangle[np.stack([first, second], axis=1)]
+    met = closed.met.T.ravel()[first]
+    folded = (index[pairs[:, 0]] != index[pairs[:, 1]]) | met
+    region = labels(len(corners), pairs[~folded])
+    region_surface, region_index = _of_regions(region, surface, index)
+    folds, beside = sides[first[folded]], region[pairs[folded]]
+    fold_surface = surface[pairs[folded, 0]]
+    curves = rings(folds, fold_surface, count)
+    curve_surface = np.zeros(int(curves.amount.sum()), int)
+    curve_surface[curves.label] = fold_surface
+    first_curve = np.full(len(region_index), len(curve_surface))
+    for side in range(2):
+        np.minimum.at(first_curve, beside[:, side], curves.label)
+    first_curve[first_curve == len(curve_surface)] = -1
+    curve_met = np.zeros(len(curve_surface), bool)
+    curve_met[curves.label] = met[folded]
+    jumps = np.abs(index[pairs[folded, 0]] - index[pairs[folded, 1]])
+    fits = np.where(curve_met[curves.label], met[folded] & (jumps <= 1), jumps == 1)
+    whole = curves.closed & (_characteristics(closed, base) == 2)
+    whole &= np.bincount(region_surface, minlength=count) == curves.amount + 1
+    whole[fold_surface[~fits | (met[folded] != curve_met[curves.label])]] = False
+    return Parts(
+        closed, region, region_surface, region_index, first_curve,
+        folds, curves.label, beside, curve_surface, curve_met, whole,
+    )  # fmt: skip
+
+
+def _of_regions(
+    region: Int[np.ndarray, " n"], surface: Int[np.ndarray, " n"], index: Int[np.ndarray, " n"]
+) -> tuple[Int[np.ndarray, " regions"], Int[np.ndarray, " regions"]]:
+    """Surface and index of each region."""
+    some = np.zeros(int(region.max(initial=-1)) + 1, int)
+    some[region] = np.arange(len(region))
+    return surface[some], index[some]
+
+
+def _characteristics(closed: Closed, base: int) -> Int[np.ndarray, " S"]:
+    """Euler characteristic of each closed surface: vertices less half the triangles."""
+    count = len(closed.owner)
+    own = distinct((closed.surface[:, None] * base + closed.corners).ravel()) // base
+    triangles = np.bincount(closed.surface, minlength=count)
+    return np.asarray(np.bincount(own, minlength=count) - triangles // 2)
+
+
+NOISE = 1e-9
+"""Share of a region's volume that does not count as overturned."""
+
+
+def fans_of(
+    parts: Parts, middles: Int[np.ndarray, " curves"]
+) -> tuple[Int[np.ndarray, "n 3"], Int[np.ndarray, " n"]]:
+    """Triangles from the middle of every curve to its sides, and the numbers of these sides."""
+    middle = middles[parts.curve]
+    fans = np.concatenate([np.sort(parts.folds, axis=1), middle[:, None]], axis=1)
+    proper = np.flatnonzero((middle >= 0) & (fans[:, :2] != middle[:, None]).all(axis=1))
+    return fans[proper], proper
+
+
+def upright_apexes(
+    parts: Parts,
+    middles: Int[np.ndarray, " curves"],
+    apexes: Int[np.ndarray, " regions"],
+    place: Float[np.ndarray, "points 3"],
+) -> tuple[Int[np.ndarray, " regions"], Bool[np.ndarray, " regions"]]:
+    """Apexes, or points in their stead that overturn less, and the regions overturned even so.
+
+    Of a region with a lid the point on the constraint can be taken, of one between several folds
+    the middle of another. Over the faces of its grid tetrahedron a region is coned upright from all
+    points inside, if the discs there are upright; those at cusps are not, at any scale, nor are
+    fans of several folds that meet there: regions at folds count only if they have a lid.
+    """
+    fans, sides = fans_of(parts, middles)
+    facets = np.concatenate([parts.closed.corners, fans, fans])
+    region = np.concatenate([parts.region, *parts.beside[sides].T])
+    signs = _coherent(facets, region)
+    count = len(apexes)
+    lidded = np.zeros(count, bool)
+    lidded[parts.region[parts.closed.lid]] = True
+    folded = parts.first_curve >= 0
+    inner = np.concatenate([parts.closed.lid, np.ones(2 * len(fans), bool)]) | ~folded[region]
+    best, least = apexes.copy(), np.full(count, np.inf)
+    for candidates in (apexes, *_others(parts, middles, lidded)):
+        corners = np.concatenate([facets, candidates[region, None]], axis=1)
+        volume = volumes(place[corners]) * signs
+        total = np.bincount(region, volume, count)
+        over = np.where(inner, np.maximum(-volume * np.sign(total)[region], 0.0), 0.0)
+        share = np.bincount(region, over, count) / np.maximum(np.abs(total), 1e-300)
+        better = (candidates >= 0) & (share < least - NOISE)
+        best[better], least[better] = candidates[better], share[better]
+    return best, (least > NOISE) & (lidded | ~folded)
+
+
+def _others(
+    parts: Parts, middles: Int[np.ndarray, " curves"], lidded: Bool[np.ndarray, " regions"]
+) -> tuple[Int[np.ndarray, " regions"], Int[np.ndarray, " regions"]]:
+    """Other points from which regions can be coned: of their lid, and of their last curve."""
+    last = np.full(len(lidded), -1)
+    for side in parts.beside.T:
+        np.maximum.at(last, side, parts.curve)
+    caps = np.where(lidded, parts.closed.cap[parts.region_surface], -1)
+    return caps, np.append(middles, -1)[last]
+
+
+def _coherent(
+    facets: Int[np.ndarray, "n 3"], region: Int[np.ndarray, " n"]
+) -> Int[np.ndarray, " n"]:
+    """Signs that orient the facets around each region coherently."""
+    base = int(facets.max(initial=0)) + 1
+    _, own = np.unique((region[:, None] * base + facets).ravel(), return_inverse=True)
+    own = own.reshape(-1, 3)
+    return orientation(own, adjacency(own))[0]

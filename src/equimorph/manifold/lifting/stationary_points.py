@@ -1,22 +1,29 @@
-"""The point at which two sheets of a set are nearest, or hang together: by Newton's method.
+"""Where two sheets approach each other inside a grid cell, and where they are nearest.
 
-Near a fold two sheets are the solutions of one scalar equation r(ξ, π) = 0 in the amplitude ξ of
-the null vector and in the parameters π (Lyapunov–Schmidt reduction [Govaerts2000]_, where the
-residual is r b). Where r is stationary the sheets are nearest to each other, or pass from one side
-of a neck to the other. Such points are regular solutions of ∇r = 0, also where r ≠ 0 and no state
-exists.
+The edges of a cell do not show what happens inside. Where two sheets meet at a fold their squared
+distance D is a smooth function of the parameters beyond the fold, too, where it is negative. Over
+each cell it is modelled from its values and slopes at the corners; where the model has a deep
+minimum, the sheets may meet inside: Newton's method finds the stationary point.
+
+See docs/decisions.md, "Approaching sheets are followed to where they are nearest".
 """
 
 from dataclasses import dataclass
+from itertools import combinations_with_replacement, product
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from equimorph.arrays import Flags, Lanes, Parameters, Some, Values
 from equimorph.columns import Columns
 from equimorph.equilibria.critical import null_border
+from equimorph.equilibria.settle import free_directions
 from equimorph.manifold.geometry.crossings import Reduction, reduction
+from equimorph.manifold.geometry.points import Points
 from equimorph.manifold.geometry.setting import Setting
+from equimorph.manifold.geometry.topology import keys_of
+from equimorph.manifold.lifting.cells import Cells
+from equimorph.manifold.lifting.pairing import Pairing
 from equimorph.tolerances import SAME_STATE
 
 ITERATIONS = 20
@@ -162,3 +169,178 @@ def _newton_step(
     amplitude = -(gradient[:, 0] + (mixed * move).sum(axis=1)) / bend
     step = np.concatenate([amplitude[:, None], move], axis=1)
     return _Newton(factor * level, curved.all(axis=1), step)
+
+
+DEEP = 0.25
+"""Share of the least squared distance at the corners below which a minimum inside is followed."""
+VARYING = 1.5
+"""Ratio of the largest squared distance around a cell to the least in it below which the sheets do
+not approach each other."""
+MOST = 0.5
+"""Share of the cells that must be looked at for their surroundings to tell."""
+SUBDIVISIONS = 4
+"""Of the lattice in each cell on which the least value of the model is sought."""
+
+Corners = Int[np.ndarray, "n corners"]
+Shares = Float[np.ndarray, "n corners"]
+
+
+@dataclass(frozen=True)
+class _Pairs(Columns):
+    """Pairs of sheets over grid cells: their points over the corners, in the same order."""
+
+    cell: Some
+    one: Corners
+    other: Corners
+
+
+def approaches(pairing: Pairing, cells: Cells, wanted: Flags) -> Starts:
+    """Where pairs of plain sheets may be nearest inside the flagged grid cells."""
+    pairs = _pairs(pairing, cells, np.flatnonzero(wanted))
+    over = _Corners.of(pairing.points, pairs)
+    if wanted.mean() > MOST:  # else the cells around are not known
+        pairs, over = over.varying(pairs)
+    ratio, shares = _models(pairing, pairs, over)
+    deep = np.flatnonzero(ratio < DEEP)
+    pairs, shares = pairs.take(deep), shares[deep]
+    middle = 0.5 * (pairing.points.z[pairs.one] + pairing.points.z[pairs.other])
+    corners = pairing.mesh.vertices[pairing.mesh.cells[pairs.cell]]
+    return Starts(pairs.cell, corners, shares, np.einsum("nc,nci->ni", shares, middle))
+
+
+@dataclass(frozen=True)
+class _Corners:
+    """Pairs of points over grid vertices, each once, with their squared distance.
+
+    place: numbers of the pairs of points over the corners of each pair of sheets.
+    """
+
+    one: Some
+    other: Some
+    squared: Values
+    place: Corners
+
+    @classmethod
+    def of(cls, points: Points, pairs: _Pairs) -> "_Corners":
+        """Number the pairs of points."""
+        keys, place = np.unique(pairs.one * points.count + pairs.other, return_inverse=True)
+        one, other = np.divmod(keys, points.count)
+        mass = points.structure.mass
+        gap = points.z[one, : len(mass)] - points.z[other, : len(mass)]
+        return cls(one, other, gap**2 @ mass, place.reshape(pairs.one.shape))
+
+    def varying(self, pairs: _Pairs) -> tuple[_Pairs, "_Corners"]:
+        """Pairs of sheets whose distance varies enough around their cells to vanish inside."""
+        around, squared = self.squared.copy(), self.squared[self.place]
+        for corner in self.place.T:
+            np.maximum.at(around, corner, squared.max(axis=1))
+        kept = around[self.place].max(axis=1) > VARYING * squared.min(axis=1)
+        used, place = np.unique(self.place[kept], return_inverse=True)
+        columns = (self.one[used], self.other[used], self.squared[used])
+        return pairs.take(kept), _Corners(*columns, place.reshape(-1, self.place.shape[1]))
+
+
+def _models(pairing: Pairing, pairs: _Pairs, over: _Corners) -> tuple[Values, Shares]:
+    """Least value of the model of D in each cell over that at the corners, and where it is."""
+    mesh, d = pairing.mesh, pairing.mesh.dimension
+    slope = _slopes(pairing.setting, pairing.points, over)
+    corners = mesh.vertices[mesh.cells[pairs.cell]]
+    along = np.einsum("ncd,nkd->nck", slope[over.place], corners[:, 1:] - corners[:, :1])
+    squared = over.squared[over.place]
+    data = np.concatenate([squared, along.reshape(len(along), (d + 1) * d)], axis=1)
+    least, shares = _least(data @ np.linalg.pinv(_data(d)).T, d)
+    return least / np.maximum(squared.min(axis=1), 1e-300), shares
+
+
+def _slopes(setting: Setting, points: Points, over: _Corners) -> Float[np.ndarray, "n d"]:
+    """Derivatives of the squared distances with respect to the free parameters."""
+    structure, n = setting.structure, setting.structure.unknowns
+    used, place = np.unique(np.concatenate([over.one, over.other]), return_inverse=True)
+    one, other = np.split(place, 2)
+    directions = free_directions(structure, setting.free, len(used))
+    system = structure.linear_system(points.z[used], points.p[used], directions)
+    tangents = system.solve(-system.columns, None).x[:, :, :n]
+    gap = (points.z[over.one, :n] - points.z[over.other, :n]) * structure.mass
+    moved = np.einsum("li,lki->lk", gap, tangents[one] - tangents[other])
+    return np.asarray(2.0 * moved / setting.scales)
+
+
+def _pairs(pairing: Pairing, cells: Cells, wanted: Some) -> _Pairs:
+    """Pairs of plain sheets over the same grid cell whose indices differ by one."""
+    mesh, points = pairing.mesh, pairing.points
+    grid, base = np.sort(mesh.cells[wanted], axis=1), len(mesh.vertices)
+    below = np.zeros(base + 1, bool)
+    below[grid] = True  # −1, where a corner lies over no vertex, stays false
+    corners, vertex = cells.corners, points.vertex[cells.corners]
+    plain = below[vertex].all(axis=1)
+    order = np.argsort(vertex[plain], axis=1)
+    vertex = np.take_along_axis(vertex[plain], order, axis=1)
+    corners = np.take_along_axis(corners[plain], order, axis=1)
+    index, keys = cells.index[plain], keys_of(grid, base)
+    by_key = np.argsort(keys)
+    at = np.searchsorted(keys[by_key], keys_of(vertex, base))
+    owner = by_key[np.minimum(at, len(by_key) - 1)] if len(by_key) else at
+    good = (grid[owner] == vertex).all(axis=1)
+    corners, index, owner = corners[good], index[good], owner[good]
+    by_owner = np.argsort(owner, kind="stable")
+    corners, index, owner = corners[by_owner], index[by_owner], owner[by_owner]
+    sheets = np.bincount(owner, minlength=len(grid))
+    ones, others = [np.zeros(0, int)], [np.zeros(0, int)]
+    for shift in range(1, int(sheets.max(initial=0))):
+        first = np.arange(len(owner) - shift)
+        both = (owner[first] == owner[first + shift]) & (
+            np.abs(index[first] - index[first + shift]) == 1
+        )
+        ones.append(first[both])
+        others.append(first[both] + shift)
+    one, other = np.concatenate(ones), np.concatenate(others)
+    # corners in the order of the grid cell, in which shares are counted
+    owner = wanted[owner]
+    back = np.argsort(np.argsort(mesh.cells[owner[one]], axis=1), axis=1)
+    return _Pairs(
+        owner[one],
+        np.take_along_axis(corners[one], back, axis=1),
+        np.take_along_axis(corners[other], back, axis=1),
+    )
+
+
+def _least(terms: Float[np.ndarray, "n terms"], d: int) -> tuple[Values, Shares]:
+    """Least values of quadratic polynomials on a simplex, and where: on a lattice, or inside."""
+    rows = [r for r in product(range(SUBDIVISIONS + 1), repeat=d) if sum(r) <= SUBDIVISIONS]
+    lattice = np.array(rows) / SUBDIVISIONS
+    values = terms @ _monomials(lattice).T
+    best = values.argmin(axis=1)
+    least, place = values.min(axis=1), lattice[best]
+    slope, bend = terms[:, 1 : 1 + d], np.zeros((len(terms), d, d))
+    for number, (i, j) in enumerate(combinations_with_replacement(range(d), 2)):
+        bend[:, i, j] += terms[:, 1 + d + number]
+        bend[:, j, i] += terms[:, 1 + d + number]
+    regular = np.abs(np.linalg.det(bend)) > 0.0
+    inner = np.full((len(terms), d), -1.0)
+    inner[regular] = -np.linalg.solve(bend[regular], slope[regular, :, None])[:, :, 0]
+    value = terms[:, 0] + 0.5 * (slope * inner).sum(axis=1)
+    better = (inner >= 0.0).all(axis=1) & (inner.sum(axis=1) <= 1.0) & (value < least)
+    place = np.where(better[:, None], inner, place)
+    shares = np.concatenate([1.0 - place.sum(axis=1, keepdims=True), place], axis=1)
+    return np.where(better, value, least), shares
+
+
+def _monomials(at: Float[np.ndarray, "points d"]) -> Float[np.ndarray, "points terms"]:
+    """1, coordinates, and their products."""
+    pairs = combinations_with_replacement(range(at.shape[1]), 2)
+    products = [at[:, i] * at[:, j] for i, j in pairs]
+    return np.stack([np.ones(len(at)), *at.T, *products], axis=1)
+
+
+def _data(d: int) -> Float[np.ndarray, "data terms"]:
+    """What quadratic polynomials have at the corners of a simplex, by their terms.
+
+    Their values there, then their slopes at each corner along the edges from the first one.
+    """
+    corners = np.concatenate([np.zeros((1, d)), np.eye(d)])
+    # central differences of quadratic polynomials are exact
+    ahead, behind = (
+        [_monomials(corner + sign * np.eye(d)) for corner in corners] for sign in (1.0, -1.0)
+    )
+    slopes = 0.5 * (np.concatenate(ahead) - np.concatenate(behind))
+    return np.concatenate([_monomials(corners), slopes])

@@ -12,7 +12,6 @@ from equimorph.arrays import Some
 from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.setting import Setting
 from equimorph.manifold.geometry.simplices import shares_in
-from equimorph.manifold.lifting.approaches import approaches
 from equimorph.manifold.lifting.cells import Cells, Seen
 from equimorph.manifold.lifting.fold_chords import (
     Turns,
@@ -23,7 +22,7 @@ from equimorph.manifold.lifting.fold_chords import (
 )
 from equimorph.manifold.lifting.pairing import Pairing
 from equimorph.manifold.lifting.polygon_cuts import chord_of
-from equimorph.manifold.lifting.stationary_points import stationary_points
+from equimorph.manifold.lifting.stationary_points import approaches, stationary_points
 from equimorph.tolerances import SAME_STATE
 
 NEAR_AN_END = 0.02
