@@ -12,7 +12,7 @@ from draws import few
 from equimorph.errors import InputError
 from equimorph.manifold import equilibrium_set, refine
 from equimorph.manifold.complex.description import Complex
-from equimorph.manifold.complex.edge_points import on_edges, unmet
+from equimorph.manifold.complex.edge_points import Places, on_edges, unmet
 from equimorph.manifold.complex.marked_complex import (
     Fabric,
     FacetMark,
@@ -359,7 +359,7 @@ def test_after_a_bisection_flips_are_looked_for_around_its_vertices_only(plain_e
     """Equal to flips that look everywhere: elsewhere nothing was left to be flipped."""
     flipped, ends, index = plain_edges
     with unchecked():
-        found, vertices = on_edges(flipped, ends, 0, index, np.full(len(ends), 0.5))
+        found, vertices = on_edges(flipped, Places(ends, 0, index, np.full(len(ends), 0.5)))
     halved = flipped.bisect(ends[found], vertices)
     everywhere = flip(halved)
     assert not np.array_equal(everywhere.cells, halved.cells)
@@ -371,8 +371,8 @@ def test_rough_tangent_spaces_of_new_vertices_are_nearly_exact(plain_edges):
     flipped, ends, index = plain_edges
     half = np.full(len(ends), 0.5)
     with unchecked():
-        found, exact = on_edges(flipped, ends, 0, index, half)
-        again, rough = on_edges(flipped, ends, 0, index, half, refining=True)
+        found, exact = on_edges(flipped, Places(ends, 0, index, half))
+        again, rough = on_edges(flipped, Places(ends, 0, index, half), refining=True)
     assert found.sum() > 50
     assert np.array_equal(again, found)
     np.testing.assert_array_equal(rough.index, exact.index)

@@ -12,7 +12,7 @@ from equimorph.charts.location import Cells, Found
 from equimorph.charts.rules import Chooser, Scoring
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.complex.cuts import Ends, cut_between
-from equimorph.manifold.complex.edge_points import on_edges
+from equimorph.manifold.complex.edge_points import Places, on_edges
 from equimorph.manifold.complex.marked_complex import Fabric, FacetMark, edges_of, fabric_of
 from equimorph.manifold.complex.vertices import Vertices, vertices_of
 from equimorph.manifold.geometry.points import VertexKind
@@ -259,7 +259,7 @@ def _straight(fabric: Fabric, ends: Ends, mark: int, wanted: Int[np.ndarray, " n
         rest = np.flatnonzero(~good)
         if len(rest):
             some = lanes[rest]
-            found, at = on_edges(fabric, ends[some], mark, wanted[some], t[rest])
+            found, at = on_edges(fabric, Places(ends[some], mark, wanted[some], t[rest]))
             z[rest[found]], p[rest[found]], good[rest] = at.z, at.p, found
         return z, p, good
 

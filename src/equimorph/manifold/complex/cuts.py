@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from equimorph.manifold.complex.edge_points import on_edges
+from equimorph.manifold.complex.edge_points import Places, on_edges
 from equimorph.manifold.complex.marked_complex import Fabric, edges_of
 from equimorph.manifold.complex.shared_edges import first_copies, with_copies
 from equimorph.manifold.complex.vertices import Vertices
@@ -198,14 +198,15 @@ def _somewhere(
 ) -> tuple[Bool[np.ndarray, " n"], Vertices, Float[np.ndarray, " n"]]:
     """Vertices on edges at the places that are proposed, or elsewhere between the bounds."""
     (low, high), t = bounds, t.copy()
-    good, at = on_edges(fabric, ends, mark, index, t)
+    target = Places(ends, mark, index, t)
+    good, at = on_edges(fabric, target)
     order = np.flatnonzero(good)
     for share in ELSEWHERE:
         left = np.flatnonzero(~good)
         if len(left) == 0:
             break
         t[left] = low[left] + share * (high - low)[left]
-        more, vertices = on_edges(fabric, ends[left], mark, index[left], t[left])
+        more, vertices = on_edges(fabric, target.take(left))
         good[left[more]] = True
         at, order = at.join(vertices), np.concatenate([order, left[more]])
     return good, at.take(np.argsort(order)), t

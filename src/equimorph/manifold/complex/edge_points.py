@@ -68,14 +68,14 @@ class Places:
     lowest: Int[np.ndarray, " n"]
     t: Float[np.ndarray, " n"]
 
+    def take(self, some: Int[np.ndarray, " some"]) -> "Places":
+        """Return some of the edges."""
+        return Places(self.ends[some], self.mark, self.lowest[some], self.t[some])
+
 
 def on_all_edges(fabric: Fabric, parts: Sequence[Places]) -> list[Tried]:
     """Exact vertices on edges, several parts at the same time; see `on_edges`."""
-
-    def find(part: Places) -> Tried:
-        return on_edges(fabric, part.ends, part.mark, part.lowest, part.t, refining=True)
-
-    return list(results_of([partial(find, part) for part in parts]))
+    return list(results_of([partial(on_edges, fabric, part, refining=True) for part in parts]))
 
 
 def unmet(fabric: Fabric, tried: Sequence[Tried]) -> list[Tried]:
@@ -104,89 +104,111 @@ def unmet(fabric: Fabric, tried: Sequence[Tried]) -> list[Tried]:
     return out
 
 
-def on_edges(
-    fabric: Fabric,
-    ends: Int[np.ndarray, "n 2"],
-    mark: int,
-    lowest: Int[np.ndarray, " n"],
-    t: Float[np.ndarray, " n"],
-    *,
-    refining: bool = False,
-) -> tuple[Bool[np.ndarray, " n"], Vertices]:
-    """Exact vertices at places t along edges with a mark, and for which edges they were found.
+def on_edges(fabric: Fabric, target: Places, *, refining: bool = False) -> Tried:
+    """Exact vertices at places along edges with a mark, and for which edges they were found.
 
     For `refining`, their tangent spaces may be rough: those at the start of the last step of
     Newton; and vertices very near to a side of the box, which make slivers, are refused.
     """
-    found, vertices = _orthogonally(fabric, ends, mark, lowest, t, rough=refining)
+    found, vertices = _orthogonally(fabric, target, rough=refining)
     left = np.flatnonzero(~found)
-    if fabric.dimension != TETRAHEDRA or mark & FacetMark.CROSSING or len(left) == 0:
+    if fabric.dimension != TETRAHEDRA or target.mark & FacetMark.CROSSING or len(left) == 0:
         return found, vertices
-    room = BESIDE if refining else 0.0
-    again, more = _beside_sides(fabric, ends[left], mark, lowest[left], t[left], room)
+    again, more = _beside_sides(fabric, target.take(left), BESIDE if refining else 0.0)
     at = np.concatenate([np.flatnonzero(found), left[again]])
     found[left[again]] = True
     return found, vertices.join(more).take(np.argsort(at))
 
 
-def _beside_sides(
-    fabric: Fabric,
-    ends: Int[np.ndarray, "n 2"],
-    mark: int,
-    lowest: Int[np.ndarray, " n"],
-    t: Float[np.ndarray, " n"],
-    least: float,
-) -> Tried:
+@dataclass(frozen=True)
+class _Guess:
+    """Points on the cubics over edges.
+
+    place: in the embedding; plane: the mean of the tangent spaces at both ends; first: the first
+    ends; length: of the edges.
+    """
+
+    z: Float[np.ndarray, "n size"]
+    p: Float[np.ndarray, "n P"]
+    place: Float[np.ndarray, "n coordinates"]
+    plane: Float[np.ndarray, "n d coordinates"]
+    first: Ends
+    length: Float[np.ndarray, " n"]
+
+
+def _guess(fabric: Fabric, target: Places) -> _Guess:
+    setting, store, ends, t = fabric.setting, fabric.vertices, target.ends, target.t
+    first, second = (fabric.end(ends, side, target.mark) for side in range(2))
+    z, p = store.z[ends], store.p[ends]
+    moves = (p[:, 1] - p[:, 0])[:, setting.free] / setting.scales
+    chord = np.concatenate([z[:, 1] - z[:, 0], moves], axis=1)
+    frames = store.frame[ends[:, 0]], store.frame[ends[:, 1]]
+    bend = Cubics(first, second).step(frames, chord, t)
+    dz, dp = split_step(setting, t[:, None] * chord + bend)
+    z, p = z[:, 0] + dz, p[:, 0] + dp
+    for k in held_parameters(target.mark, fabric.dimension):
+        p[:, setting.free[k]] = store.p[ends[:, 0], setting.free[k]]
+    # the second space seen from the first, so that both bases point the same way
+    turned = first.rows @ np.swapaxes(second.rows, 1, 2)
+    plane = first.rows + turned @ second.rows
+    length = np.linalg.norm(second.place - first.place, axis=1)
+    return _Guess(z, p, embed(setting, z, p), plane, first, length)
+
+
+def _beside_sides(fabric: Fabric, target: Places, least: float) -> Tried:
     """Vertices on edges that the set bulges over a side of the box from, and for which edges.
 
     They keep the parameter that the side holds, which must be off it by more than `least`,
     relative to the edge.
     """
-    setting, store, d = fabric.setting, fabric.vertices, fabric.dimension
-    first, second = (fabric.end(ends, side, mark) for side in range(2))
-    z, p = _predict(fabric, ends, mark, t)
-    turned = first.rows @ np.swapaxes(second.rows, 1, 2)
-    plane = first.rows + turned @ second.rows
-    length = np.linalg.norm(second.place - first.place, axis=1)
-    place = embed(fabric.setting, z, p)
-    freely = _on_curves(fabric, mark, z, p, place, plane, length, first)
-    found = np.zeros(len(ends), bool)
+    setting, store, d, mark = fabric.setting, fabric.vertices, fabric.dimension, target.mark
+    guess = _guess(fabric, target)
+    z, p, place, plane = guess.z, guess.p, guess.place, guess.plane
+    freely = on_curves(fabric, mark, z, p, place, plane, guess.length, guess.first)
+    found = np.zeros(len(z), bool)
     for k in range(d):
         free = freely.p[:, setting.free[k]]
         beyond = (free < fabric.box[0, k]) | (free > fabric.box[1, k])
-        a, b = store.p[ends, setting.free[k]].T
-        there = a + t * (b - a)
+        a, b = store.p[target.ends, setting.free[k]].T
+        there = a + target.t * (b - a)
         room = np.abs(there[:, None] - fabric.box[:, k]).min(axis=1) / setting.scales[k]
-        own = np.flatnonzero(freely.found & beyond & (room > least * length) & ~found)
+        own = np.flatnonzero(freely.found & beyond & (room > least * guess.length) & ~found)
         if len(own) == 0:
             continue
         near_z, near_p = z[own], p[own].copy()
         near_p[:, setting.free[k]] = there[own]
-        end = first.take(own)
+        end = guess.first.take(own)
         row = plane[own][:, :, plane.shape[2] - d + k]
         end = replace(end, slopes=np.concatenate([end.slopes, row[:, None]], axis=1))
-        place[own] = embed(fabric.setting, near_z, near_p)
-        given = near_z, near_p, place[own], plane[own], length[own]
-        pinned = _on_curves(fabric, mark | FacetMark.SIDE << 2 * k, *given, end)
+        place[own] = embed(setting, near_z, near_p)
+        given = near_z, near_p, place[own], plane[own], guess.length[own]
+        pinned = on_curves(fabric, mark | FacetMark.SIDE << 2 * k, *given, end)
         z[own], p[own], found[own] = pinned.z, pinned.p, pinned.found
-    return _accept(fabric, Places(ends, mark, lowest, t), Pinned(z, p, found), place, plane)
+    return _accept(fabric, target, Pinned(z, p, found), place, plane)
 
 
 def _accept(
     fabric: Fabric,
     target: Places,
-    at: Pinned,
+    at: Corrected | Pinned,
     place: Float[np.ndarray, "n coordinates"],
     plane: Float[np.ndarray, "n d coordinates"],
 ) -> Tried:
     """Those vertices on edges that are close to where they were looked for, and of the index."""
+    lowest, mark = target.lowest, target.mark
     found = _is_close(fabric, target, at, place)
-    found &= _of_index(fabric, target.mark, at, found, target.lowest)
-    vertices = _vertices_at(fabric, target.mark, at, found, target.lowest, plane)
+    if isinstance(at, Corrected):
+        found &= at.index == lowest
+        vertices = free_vertices(fabric.setting, at if found.all() else at.take(found))
+    else:
+        if mark & FacetMark.CROSSING:
+            lowest = fabric.vertices.index[target.ends].max(axis=1)
+        found = of_index(fabric, mark, at, found, lowest)
+        vertices = vertices_at(fabric, mark, at, found, lowest, plane)
     way = np.subtract(*(fabric.vertices.place[target.ends[:, side]] for side in (1, 0)))
-    good = _along(replace(fabric, vertices=vertices), target.mark, way[found])
+    good = _along(replace(fabric, vertices=vertices), mark, way[found])
     found[found] = good
-    return found, vertices.take(np.flatnonzero(good))
+    return found, vertices if good.all() else vertices.take(np.flatnonzero(good))
 
 
 def _is_close(
@@ -207,61 +229,19 @@ def _is_close(
     return np.asarray(close & inside.all(axis=1))
 
 
-def _orthogonally(
-    fabric: Fabric,
-    ends: Int[np.ndarray, "n 2"],
-    mark: int,
-    lowest: Int[np.ndarray, " n"],
-    t: Float[np.ndarray, " n"],
-    *,
-    rough: bool = False,
-) -> tuple[Bool[np.ndarray, " n"], Vertices]:
+def _orthogonally(fabric: Fabric, target: Places, *, rough: bool) -> Tried:
     """Vertices corrected orthogonally to the mean of the tangent spaces at both ends of edges."""
-    setting, store = fabric.setting, fabric.vertices
-    first, second = (fabric.end(ends, side, mark) for side in range(2))
-    z, p = _predict(fabric, ends, mark, t)
-    # the second space seen from the first, so that both bases point the same way
-    turned = first.rows @ np.swapaxes(second.rows, 1, 2)
-    plane = first.rows + turned @ second.rows
-    place = embed(fabric.setting, z, p)
-    length = np.linalg.norm(second.place - first.place, axis=1)
+    guess, mark = _guess(fabric, target), target.mark
+    near = guess.z, guess.p, guess.place, guess.plane, guess.length
+    at: Corrected | Pinned
     if mark == 0 and rough:
-        at: Corrected | Pinned = corrected_amid(setting, z, p, place, plane, length)
+        at = corrected_amid(fabric.setting, *near)
     else:
-        at = _on_curves(fabric, mark, z, p, place, plane, length, first)
-    found = _is_close(fabric, Places(ends, mark, lowest, t), at, place)
-    if isinstance(at, Corrected):
-        found &= at.index == lowest
-        vertices = free_vertices(setting, at if found.all() else at.take(found))
-    else:
-        if mark & FacetMark.CROSSING:
-            lowest = store.index[ends].max(axis=1)
-        found &= _of_index(fabric, mark, at, found, lowest)
-        vertices = _vertices_at(fabric, mark, at, found, lowest, plane)
-    good = _along(replace(fabric, vertices=vertices), mark, (second.place - first.place)[found])
-    found[found] = good
-    return found, vertices if good.all() else vertices.take(np.flatnonzero(good))
+        at = on_curves(fabric, mark, *near, guess.first)
+    return _accept(fabric, target, at, guess.place, guess.plane)
 
 
-def _predict(
-    fabric: Fabric, ends: Int[np.ndarray, "n 2"], mark: int, t: Float[np.ndarray, " n"]
-) -> tuple[Float[np.ndarray, "n size"], Float[np.ndarray, "n P"]]:
-    """Points at places t on the cubics over edges."""
-    setting, store = fabric.setting, fabric.vertices
-    first, second = (fabric.end(ends, side, mark) for side in range(2))
-    z, p = store.z[ends], store.p[ends]
-    moves = (p[:, 1] - p[:, 0])[:, setting.free] / setting.scales
-    chord = np.concatenate([z[:, 1] - z[:, 0], moves], axis=1)
-    frames = store.frame[ends[:, 0]], store.frame[ends[:, 1]]
-    bend = Cubics(first, second).step(frames, chord, t)
-    dz, dp = split_step(setting, t[:, None] * chord + bend)
-    z, p = z[:, 0] + dz, p[:, 0] + dp
-    for k in held_parameters(mark, fabric.dimension):
-        p[:, setting.free[k]] = store.p[ends[:, 0], setting.free[k]]
-    return z, p
-
-
-def _on_curves(
+def on_curves(
     fabric: Fabric,
     mark: int,
     z: Float[np.ndarray, "n size"],
@@ -289,7 +269,7 @@ def _on_curves(
     return corrected(aim, z, p, length)
 
 
-def _of_index(
+def of_index(
     fabric: Fabric,
     mark: int,
     at: Pinned,
@@ -305,7 +285,7 @@ def _of_index(
     return good
 
 
-def _vertices_at(
+def vertices_at(
     fabric: Fabric,
     mark: int,
     at: Pinned,

@@ -12,8 +12,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from equimorph.arrays import Edges
-from equimorph.equilibria.settle import lower_index
-from equimorph.manifold.complex.edge_points import chunks
+from equimorph.manifold.complex.edge_points import chunks, of_index, on_curves, vertices_at
 from equimorph.manifold.complex.marked_complex import (
     TRIANGLES,
     Fabric,
@@ -23,9 +22,7 @@ from equimorph.manifold.complex.marked_complex import (
     squared_sides,
 )
 from equimorph.manifold.complex.shared_edges import copies
-from equimorph.manifold.complex.vertices import Vertices, vertices_of
-from equimorph.manifold.geometry.exact_points import Aim, corrected
-from equimorph.manifold.geometry.points import CAP, CORNER, FOLD, REFINED
+from equimorph.manifold.complex.vertices import Vertices
 from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.geometry.tangents import split_step
 from equimorph.manifold.geometry.topology import count_corners, distinct, keys_of, rows_of
@@ -224,39 +221,27 @@ def _at_better_places(
 
     The place is searched for in the tangent space and corrected orthogonally to it.
     """
-    setting, store, d = fabric.setting, fabric.vertices, fabric.dimension
+    setting, store = fabric.setting, fabric.vertices
     none = np.zeros(len(chosen), bool)
-    directions = np.swapaxes(
-        fabric.end(np.repeat(chosen[:, None], 2, axis=1), 0, mark).allowed, 1, 2
-    )
+    end = fabric.end(np.repeat(chosen[:, None], 2, axis=1), 0, mark)
+    directions = np.swapaxes(end.allowed, 1, 2)
     if directions.shape[1] == 0:
         return none, store.take(chosen[none])
     step = _best_steps(_stars(fabric, around, chosen, directions), len(chosen))
     far = np.linalg.norm(step, axis=1) > 0.0
-    chosen, directions, step = chosen[far], directions[far], step[far]
+    chosen, directions, step, end = chosen[far], directions[far], step[far], end.take(far)
     along = np.einsum("nk,nkd->nd", step, directions)
     dz, dp = split_step(setting, np.einsum("nd,ndf->nf", along, store.frame[chosen]))
     z, p = store.z[chosen] + dz, store.p[chosen] + dp
-    for k in held_parameters(mark, d):
+    for k in held_parameters(mark, fabric.dimension):
         p[:, setting.free[k]] = store.p[chosen, setting.free[k]]
-    span = np.tile(np.delete(np.eye(d), held_parameters(mark, d), axis=0), (len(chosen), 1, 1))
-    fold, cap = bool(mark & FacetMark.FOLD), bool(mark & FacetMark.CAP)
-    aim = Aim(setting, fold, cap, span, embed(setting, z, p), directions @ store.rows[chosen])
-    if not held_parameters(mark, d):
-        aim = replace(aim, tangents=store.rows[chosen])
-    pinned = corrected(aim, z, p, np.linalg.norm(step, axis=1))
-    free, found = pinned.p[:, setting.free], pinned.found
-    found &= ((free >= fabric.box[0]) & (free <= fabric.box[1])).all(axis=1)
-    index = store.index[chosen]
-    states = pinned.z[found], pinned.p[found]
-    counted = lower_index(setting.structure, *states) if fold else setting.structure.index(*states)
-    found[found] = counted == index[found]
-    kind = {(False, False): REFINED, (True, False): FOLD, (False, True): CAP, (True, True): CORNER}
-    some = int(found.sum())
-    z, p, index, nowhere = pinned.z[found], pinned.p[found], index[found], np.full(some, -1)
-    kinds, planes = np.full(some, kind[fold, cap]), store.rows[chosen[found]]
+    planes, length = store.rows[chosen], np.linalg.norm(step, axis=1)
+    pinned = on_curves(fabric, mark, z, p, embed(setting, z, p), planes, length, end)
+    free = pinned.p[:, setting.free]
+    found = pinned.found & ((free >= fabric.box[0]) & (free <= fabric.box[1])).all(axis=1)
+    found = of_index(fabric, mark, pinned, found, store.index[chosen])
     none[np.flatnonzero(far)[found]] = True
-    return none, vertices_of(setting, z, p, kinds, index, nowhere, planes)
+    return none, vertices_at(fabric, mark, pinned, found, store.index[chosen], planes)
 
 
 @dataclass(frozen=True)
