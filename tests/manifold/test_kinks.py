@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from draws import few
 from equimorph.manifold import EquilibriumSet, equilibrium_set
-from equimorph.manifold.complex.description import contradictions, turned_off_folds
+from equimorph.manifold.complex.description import contradictions, overturned_off_folds
 from equimorph.manifold.geometry.topology import adjacency, senses
 from equimorph.model import Box, Constraint, Descriptor
 from oracles.complexes import SINGULAR, assert_faithful
@@ -119,5 +119,7 @@ def test_the_audit_names_cells_of_a_wrong_index_and_sense():
     corners = place[eset.cells[cell]]
     place[eset.cells[cell, 0]] = 2 * corners[1:].mean(axis=0) - corners[0]
     turned = senses(eset.cells, eset.cell_index, place, adjacency(eset.cells)).overturned
-    assert turned_off_folds(eset.kinds, eset.cells, turned, place)[cell]
-    assert not turned_off_folds(eset.kinds, eset.cells, sense.overturned, eset.coordinates).any()
+    assert overturned_off_folds(eset.kinds, eset.cells, turned, place)[cell]
+    assert not overturned_off_folds(
+        eset.kinds, eset.cells, sense.overturned, eset.coordinates
+    ).any()

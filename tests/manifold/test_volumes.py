@@ -14,7 +14,7 @@ from equimorph.manifold import (
     stability_distance,
 )
 from equimorph.manifold.complex.marked_complex import fabric_of, squared_sides
-from equimorph.manifold.geometry.exact_points import Aim, corrected
+from equimorph.manifold.geometry.exact_points import Aim, correct_points
 from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.geometry.simplices import volumes
 from equimorph.manifold.geometry.topology import (
@@ -309,7 +309,7 @@ def test_refined_arch_over_three_parameters_has_no_slivers():
         nearest = cells[np.arange(1000), share.argmax(axis=1)]
         place, span = embed(setting, z, p), np.tile(np.eye(3), (1000, 1, 1))
         aim = Aim(setting, False, False, span, place, fabric.vertices.rows[nearest])
-        found = corrected(aim, z, p, np.full(1000, 0.5))
+        found = correct_points(aim, z, p, np.full(1000, 0.5))
         assert found.found.all()
         away = np.linalg.norm(embed(setting, found.z, found.p) - place, axis=1)
     assert away.max() <= 0.05

@@ -19,7 +19,7 @@ from equimorph.equilibria.settle import (
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.geometry.setting import Setting
-from equimorph.manifold.geometry.tangents import placed_frames, split_step, tangent_frames
+from equimorph.manifold.geometry.tangents import frames_in_embedding, split_step, tangent_frames
 from equimorph.manifold.lookup.exact_states import exact_states
 from equimorph.model import Descriptor, position
 from equimorph.structures import value_of
@@ -107,7 +107,7 @@ def frames_anywhere(setting: Setting, z: Lanes, p: Parameters) -> Frames:
     frames = np.zeros((len(z), d, z.shape[1] + d))
     for _ in range(2):
         frames = tangent_frames(setting, z, p, rows)
-        rows = placed_frames(setting, frames)
+        rows = frames_in_embedding(setting, frames)
     return frames
 
 

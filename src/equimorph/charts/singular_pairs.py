@@ -20,7 +20,7 @@ from equimorph.arrays import Frames, Points
 from equimorph.charts.coordinates import Coordinates, solve_on_the_set
 from equimorph.charts.location import Cells, Found
 from equimorph.manifold.geometry.setting import embed
-from equimorph.manifold.geometry.tangents import placed_frames, split_step, tangent_frames
+from equimorph.manifold.geometry.tangents import frames_in_embedding, split_step, tangent_frames
 from equimorph.manifold.lookup.cell_index import Hits
 from equimorph.structures import States
 
@@ -116,7 +116,7 @@ class SingularPairs:
     def _jacobian(self, z: np.ndarray, p: np.ndarray) -> Float[np.ndarray, "singular d d"]:
         """Derivatives of the coordinates, in their ranges, along tangents."""
         setting = self.coordinates.setting
-        frames = tangent_frames(setting, z, p, placed_frames(setting, self._frames))
+        frames = tangent_frames(setting, z, p, frames_in_embedding(setting, self._frames))
         return np.asarray(self.coordinates.derivative(z, p, frames) / self._ranges[:, None])
 
     def add_to(self, found: Found, points: Points) -> Found:
@@ -126,7 +126,7 @@ class SingularPairs:
         tangent = np.einsum("nd,ndf->nf", step, self._frames[near])
         dz, dp = split_step(setting, tangent)
         start = self.states[near]
-        rows = placed_frames(setting, self._frames[near])
+        rows = frames_in_embedding(setting, self._frames[near])
         own = solve_on_the_set(self.coordinates, start.z + dz, start.p + dp, points[point], rows)
         moved = embed(setting, own.z, own.p) - embed(setting, start.z, start.p)
         good = own.found & (np.linalg.norm(moved, axis=1) <= 2.0 * self._longest)

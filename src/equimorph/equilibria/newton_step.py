@@ -173,7 +173,7 @@ class Points(Columns):
     b: Float[np.ndarray, "lanes border"]
     rows: Float[np.ndarray, "lanes rows bordered"]
 
-    def moved(self, step: Step, share: Values) -> "Points":
+    def move(self, step: Step, share: Values) -> "Points":
         """Points after shares of a step, with the border and the rows of the points before."""
         problem = self.problem
         z, p, beta = np.empty_like(self.z), np.empty_like(self.p), np.empty_like(self.beta)
@@ -181,7 +181,7 @@ class Points(Columns):
         move_lanes(self.z, self.p, self.beta, *given, z, p, beta)
         return Points(problem, z, p, beta, self.b, self.rows)
 
-    def renewed(self, step: Step, some: Some) -> "Points":
+    def renew(self, step: Step, some: Some) -> "Points":
         """Some of the lanes after a step, with the border and the rows that it found."""
         if len(some) == 0:
             return self

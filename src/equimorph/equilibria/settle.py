@@ -187,19 +187,19 @@ def settle(
     """
     guards = Guards() if guards is None else guards
     if directions is None and not conditions and guards.known is None:
-        return _believed(structure, _at_parameters(structure, z, p, guards), (z, p), guards)
+        return _apply_guards(structure, _at_parameters(structure, z, p, guards), (z, p), guards)
     frame = Tangents() if frame is None else frame
     if directions is None:
         directions = np.zeros((len(z), 0, p.shape[1]))
     problem = Problem(structure, directions, tuple(conditions), frame)
     if problem.in_one_plane and guards.known is None:
-        return _believed(structure, _in_one_plane(problem, z, p, guards), (z, p), guards)
-    return _believed(structure, _by_steps(problem, z, p, guards, frames=frames), (z, p), guards)
+        return _apply_guards(structure, _in_one_plane(problem, z, p, guards), (z, p), guards)
+    return _apply_guards(structure, _by_steps(problem, z, p, guards, frames=frames), (z, p), guards)
 
 
 def _at_parameters(structure: Equations, z: Lanes, p: Parameters, guards: Guards) -> Settled:
     """Newton's method by the fused step of the structure."""
-    return _settled(newton(structure, z, p, guards))
+    return _as_settled(newton(structure, z, p, guards))
 
 
 def _in_one_plane(problem: Problem, z: Lanes, p: Parameters, guards: Guards) -> Settled:
@@ -214,10 +214,10 @@ def _in_one_plane(problem: Problem, z: Lanes, p: Parameters, guards: Guards) -> 
         weights = weights_of(problem.structure, z.shape[1] + 1)
         length = np.sqrt(found.tangents**2 @ weights)
         np.divide(found.tangents, length[:, :, None], found.tangents)
-    return _settled(found)
+    return _as_settled(found)
 
 
-def _settled(found: Newton) -> Settled:
+def _as_settled(found: Newton) -> Settled:
     lanes, k = found.tangents.shape[:2]
     sure, slopes = np.ones(lanes, bool), np.zeros((lanes, 0, k))
     told = (found.status, found.size, found.first, found.index, sure, found.tangents, slopes)
@@ -233,8 +233,8 @@ def _by_steps(
     while len(run.lanes):
         step = here.step()  # onto the set, and along it to the conditions
         status, share = run.judge(here, step)
-        there = here.moved(step, share)
-        here = there.renewed(step, run.record(there, step, status))
+        there = here.move(step, share)
+        here = there.renew(step, run.record(there, step, status))
     return run.settled()
 
 
@@ -325,7 +325,7 @@ def _lengthening(
     return np.asarray(1.0 / (1.0 - np.nansum(slopes, axis=1)))
 
 
-def _believed(
+def _apply_guards(
     structure: Equations, settled: Settled, start: tuple[Lanes, Parameters], guards: Guards
 ) -> Settled:
     """The points, those that are not believed marked in place."""

@@ -15,7 +15,7 @@ from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.geometry.tangents import fold_slopes, split_step
 from equimorph.manifold.geometry.topology import faces_of
 from equimorph.manifold.queries.least_squares import DIFFERENCE, Residuals, nearest
-from equimorph.manifold.queries.locate import ValueFit, different, pieces_of
+from equimorph.manifold.queries.locate import ValueFit, distinct_states, pieces_of
 from equimorph.manifold.queries.nearest import Ground, SetPoints, local_minima, points_at_vertices
 from equimorph.model import Descriptor
 from equimorph.structures import State, States, shape_coordinate
@@ -167,7 +167,7 @@ def estimate_state(
     if not unstable and not (eset.cell_index == 0).any():
         raise InputError("`eset` must have stable cells; got none.")
     found, misfit, inside = _minima(eset, fit.residuals, unstable)
-    order = different(eset.structure, found, misfit)
+    order = distinct_states(eset.structure, found, misfit)
     order = order[_weights(misfit[order] ** 2) > NEGLIGIBLE]
     found, chi2 = found.take(order), misfit[order] ** 2
     states = States(eset.structure, found.z, found.p)
@@ -237,8 +237,8 @@ def _at_edge(
     across = fold_slopes(ground.setting, edge.z, edge.p, frames)
     across /= np.linalg.norm(across, axis=1, keepdims=True)
     here = SetPoints(edge.z, edge.p, rows)
-    inner, there = ground.moved(here, frames, INWARD * across)
-    outer, back = ground.moved(here, frames, -INWARD * across)
+    inner, there = ground.move(here, frames, INWARD * across)
+    outer, back = ground.move(here, frames, -INWARD * across)
     stable = [eset.structure.index(side.z, side.p) == 0 for side in (inner, outer)]
     nearer = [np.linalg.norm(residuals(side.z, side.p), axis=1) < misfit for side in (inner, outer)]
     parts = there & back & (stable[0] != stable[1])

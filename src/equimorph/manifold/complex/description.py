@@ -229,7 +229,9 @@ def _audit(
         sense = senses(corners, cell_index, coordinates, whole, component)
     edges = len(whole.facets) if whole.facets.shape[1] == PAIR else None
     wrong = contradictions(points, given.kinds, corners, cell_index)
-    wrong |= turned_off_folds(given.kinds, corners, sense.overturned, coordinates / setting.scales)
+    wrong |= overturned_off_folds(
+        given.kinds, corners, sense.overturned, coordinates / setting.scales
+    )
     whole_crossing = whole.counts == SHEETS_AT_A_CROSSING
     most = np.where(crossed, SHEETS_AT_A_CROSSING, 2)
     kinds = [boundary.kind for boundary in boundaries]
@@ -258,7 +260,7 @@ def wrong_cells(eset: EquilibriumSet) -> Bool[np.ndarray, " C"]:
     """Return which cells of a set without crossings `Audit.wrong` counts."""
     coordinates, scales = eset.coordinates, eset.setting.scales
     sense = senses(eset.cells, eset.cell_index, coordinates, adjacency(eset.cells), eset.component)
-    off = turned_off_folds(eset.kinds, eset.cells, sense.overturned, coordinates / scales)
+    off = overturned_off_folds(eset.kinds, eset.cells, sense.overturned, coordinates / scales)
     of_index = contradictions(eset.points, eset.kinds, eset.cells, eset.cell_index)
     return np.asarray(of_index | off)
 
@@ -291,7 +293,7 @@ def contradictions(
     return np.asarray(((index < low[cells]) | (index > high[cells])).any(axis=1))
 
 
-def turned_off_folds(
+def overturned_off_folds(
     kinds: Int[np.ndarray, " V"],
     cells: Int[np.ndarray, "C corners"],
     overturned: Bool[np.ndarray, " C"],

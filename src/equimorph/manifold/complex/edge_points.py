@@ -15,8 +15,8 @@ from equimorph.manifold.geometry.exact_points import (
     Aim,
     Corrected,
     Pinned,
-    corrected,
-    corrected_amid,
+    correct_between,
+    correct_points,
 )
 from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.setting import embed
@@ -235,7 +235,7 @@ def _orthogonally(fabric: Fabric, target: Places, *, rough: bool) -> Tried:
     near = guess.z, guess.p, guess.place, guess.plane, guess.length
     at: Corrected | Pinned
     if mark == 0 and rough:
-        at = corrected_amid(fabric.setting, *near)
+        at = correct_between(fabric.setting, *near)
     else:
         at = on_curves(fabric, mark, *near, guess.first)
     return _accept(fabric, target, at, guess.place, guess.plane)
@@ -266,7 +266,7 @@ def on_curves(
         bool(mark & FacetMark.CROSSING),
         plane if len(span) == d else None,
     )
-    return corrected(aim, z, p, length)
+    return correct_points(aim, z, p, length)
 
 
 def of_index(

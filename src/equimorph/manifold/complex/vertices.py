@@ -14,7 +14,7 @@ from equimorph.manifold.geometry.setting import Setting, embed
 from equimorph.manifold.geometry.tangents import (
     cap_slopes,
     fold_slopes,
-    placed_frames,
+    frames_in_embedding,
     tangent_frames,
 )
 
@@ -151,7 +151,7 @@ def _with_slopes(
     slopes: tuple[Float[np.ndarray, "V d"], Float[np.ndarray, "V d"], Float[np.ndarray, "V d"]],
 ) -> Vertices:
     """Vertices with all that is known of them, in the coordinates of the embedding, too."""
-    place, placed = embed(setting, z, p), placed_frames(setting, frame)
+    place, placed = embed(setting, z, p), frames_in_embedding(setting, frame)
     lone = np.full(len(kinds), -1)
     return Vertices(z, p, kinds, index, grid_vertex, place, frame, placed, *slopes, lone)
 

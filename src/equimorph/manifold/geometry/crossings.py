@@ -17,7 +17,7 @@ from equimorph.arrays import Frames, Lanes, Parameters, Rows, Values
 from equimorph.equilibria.critical import Critical, null_border
 from equimorph.equilibria.settle import free_directions
 from equimorph.manifold.geometry.setting import Setting
-from equimorph.manifold.geometry.tangents import placed_frames
+from equimorph.manifold.geometry.tangents import frames_in_embedding
 from equimorph.structures import Structure
 
 Slopes = Float[np.ndarray, "lanes d"]
@@ -92,7 +92,7 @@ def crossing_frames(setting: Setting, z: Lanes, p: Parameters, rows: Rows) -> tu
     The bases, and the slope along them of what vanishes on the other sheet, of unit length.
     """
     kernel, hessian = _kernel(setting, z, p)
-    near = np.einsum("ldc,lkc->ldk", rows, placed_frames(setting, kernel))
+    near = np.einsum("ldc,lkc->ldk", rows, frames_in_embedding(setting, kernel))
     values, vectors = np.linalg.eigh(hessian)
     low, high = (np.sqrt(np.maximum(sign * values[:, k], 0.0)) for sign, k in ((-1, 0), (1, -1)))
     normals = np.stack(
@@ -123,10 +123,10 @@ def _kernel(
     directions = free_directions(setting.structure, free, len(z))
     known = reduction(setting.structure, z, p, null_border(setting.structure, z, p), directions)
     raw = np.concatenate([known.along_z, known.along_p[:, :, free] / scales], axis=2)
-    size = np.linalg.norm(placed_frames(setting, raw), axis=2)
+    size = np.linalg.norm(frames_in_embedding(setting, raw), axis=2)
     raw /= size[:, :, None]
     hessian = known.hessian / (size[:, :, None] * size[:, None])
-    turn = np.swapaxes(np.linalg.inv(_factor(placed_frames(setting, raw))), 1, 2)
+    turn = np.swapaxes(np.linalg.inv(_factor(frames_in_embedding(setting, raw))), 1, 2)
     return turn @ raw, turn @ hessian @ np.swapaxes(turn, 1, 2)
 
 

@@ -143,7 +143,7 @@ class Aim(Columns):
         return out
 
 
-def corrected(
+def correct_points(
     aim: Aim,
     z: Lanes,
     p: Parameters,
@@ -171,7 +171,7 @@ def corrected(
     return Pinned(found.z, found.p, good)
 
 
-def corrected_amid(
+def correct_between(
     setting: Setting,
     z: Lanes,
     p: Parameters,
@@ -266,8 +266,8 @@ def pin(
     aim = Aim(setting, fold, cap, span, embed(setting, z, p), rows)
     low = np.array([points.index[list(group)].min() for group in groups], int)
     if not fold:
-        return corrected(aim, z, p, around, index=low)
-    pinned = corrected(aim, z, p, around, low)
+        return correct_points(aim, z, p, around, index=low)
+    pinned = correct_points(aim, z, p, around, low)
     for steps, end in product(LED, (0, -1)) if not cap else ():
         lanes = np.flatnonzero(~pinned.found)
         if len(lanes) == 0:
@@ -298,7 +298,7 @@ def _lead(
         middle = (1.0 - share) * start + share * aim.middle
         own = replace(aim, middle=middle).take(lanes)
         right = low[lanes] if share == 1.0 else None
-        pinned = corrected(own, z[lanes], p[lanes], 2.0 * around[lanes] / steps, right)
+        pinned = correct_points(own, z[lanes], p[lanes], 2.0 * around[lanes] / steps, right)
         z[lanes], p[lanes], found[lanes] = pinned.z, pinned.p, pinned.found
     return Pinned(z, p, found)
 
@@ -315,7 +315,7 @@ def pin_crossings(
     rows = principal_directions(deviations, span.shape[1] - 1 - cap)
     around = np.linalg.norm(deviations, axis=2).max(axis=1, initial=0.0)
     aim = Aim(setting, False, cap, span, embed(setting, z, p), rows, crossing=True)
-    return corrected(aim, z, p, around)
+    return correct_points(aim, z, p, around)
 
 
 def middles(

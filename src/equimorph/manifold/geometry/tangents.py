@@ -45,7 +45,7 @@ def tangent_frames(setting: Setting, z: Lanes, p: Parameters, rows: Rows) -> Fra
     return orthonormal_rows(frames, d, weights_of(structure, size + d))
 
 
-def placed_frames(setting: Setting, frames: Frames) -> Rows:
+def frames_in_embedding(setting: Setting, frames: Frames) -> Rows:
     """Bases of tangent spaces in the coordinates of the embedding."""
     n, d = setting.structure.unknowns, len(setting.free)
     u = frames[:, :, :n] * np.sqrt(setting.structure.mass)

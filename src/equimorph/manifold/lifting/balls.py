@@ -60,7 +60,7 @@ def pin_in_cells(
     Parameters
     ----------
     groups, kind, span
-        As in `pins.pin`.
+        As in `pin`.
     frames
         Corners of the grid cells, in free parameters.
     """

@@ -17,7 +17,7 @@ from equimorph.equilibria.settle import lower_index
 from equimorph.manifold.geometry.exact_points import (
     Aim,
     Pinned,
-    corrected,
+    correct_points,
     pin_crossings,
 )
 from equimorph.manifold.geometry.points import VertexKind
@@ -183,7 +183,7 @@ def _hub(pairing: Pairing, triangle: int, chord: Chord) -> int | None:
         aim = Aim(setting, False, False, span, middle, rows, crossing=True)
         # in this form what both have in common stays what it is, to the last digit
         guess_z, guess_p = (each[:1] + share * (each[1:] - each[:1]) for each in (z, p))
-        pinned = corrected(aim, guess_z, guess_p, np.array([length]))
+        pinned = correct_points(aim, guess_z, guess_p, np.array([length]))
         if not pinned.found[0]:
             raise _NoCrossingError
         found.append(pinned)

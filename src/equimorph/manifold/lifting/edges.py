@@ -15,7 +15,7 @@ from equimorph.equilibria.kernels import FIRST_SHARE, LEAST_COSINE, MULTIPLIER_W
 from equimorph.equilibria.settle import Held, lower_index
 from equimorph.equilibria.trace import Traces, trace
 from equimorph.equilibria.trace_options import EventCode
-from equimorph.manifold.geometry.exact_points import Aim, Pinned, corrected
+from equimorph.manifold.geometry.exact_points import Aim, Pinned, correct_points
 from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.lifting.pairing import Pairing, RayMark, Rays
@@ -297,7 +297,7 @@ def _pin(
     place, fold = embed(setting, z, p), kind == VertexKind.FOLD
     rows = place[:, None][:, :0]
     aim = Aim(setting, fold, False, span[:, None], place, rows, crossing=not fold)
-    pinned = corrected(aim, z, p, np.zeros(len(place)))
+    pinned = correct_points(aim, z, p, np.zeros(len(place)))
     if fold:
         moved = np.linalg.norm(embed(setting, pinned.z, pinned.p) - place, axis=1)
         pinned = replace(pinned, found=pinned.found & (moved < NOISE))

@@ -13,7 +13,7 @@ from jaxtyping import Bool, Int
 
 from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.setting import embed
-from equimorph.manifold.geometry.tangents import placed_frames, tangent_frames
+from equimorph.manifold.geometry.tangents import frames_in_embedding, tangent_frames
 from equimorph.manifold.lifting.pairing import Pairing
 
 ALONG, ASIDE = 0.1, 0.3
@@ -144,7 +144,7 @@ def _on_own_sheets(pairing: Pairing, chains: list[Polygon]) -> bool:
     place, d = embed(setting, z, p), len(setting.free)
     rows = np.zeros((len(ends), d, place.shape[1]))
     rows[:, :, -d:] = np.eye(d)
-    planes = placed_frames(setting, tangent_frames(setting, z, p, rows))
+    planes = frames_in_embedding(setting, tangent_frames(setting, z, p, rows))
     chord = place[None] - place[:, None]
     flat = np.einsum("adc,abc->abd", planes, chord)
     length = np.maximum(np.linalg.norm(chord, axis=2), 1e-300)

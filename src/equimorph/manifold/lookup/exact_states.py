@@ -49,7 +49,7 @@ STRAIGHT_ON = TraceOptions(
 )
 
 
-def turned_back(
+def lifts_across_folds(
     states: States, velocity: Points
 ) -> tuple[Float[np.ndarray, "some size"], Int[np.ndarray, " some"]]:
     """States in which moves of the parameters end that turn back at a fold; which moves do."""

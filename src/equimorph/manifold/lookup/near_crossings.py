@@ -24,7 +24,7 @@ from equimorph.equilibria.critical import Critical, null_border
 from equimorph.equilibria.newton_step import Planes
 from equimorph.equilibria.point_conditions import Plane
 from equimorph.equilibria.settle import Guards, lower_index, settle
-from equimorph.manifold.geometry.exact_points import Aim, Pinned, corrected
+from equimorph.manifold.geometry.exact_points import Aim, Pinned, correct_points
 from equimorph.manifold.geometry.setting import Setting, embed
 from equimorph.manifold.geometry.simplices import shares_in
 from equimorph.manifold.geometry.topology import adjacency, keys_of, rows_of
@@ -154,7 +154,7 @@ class NearCrossings:
         rows = middle[:, None][:, :0]
         aim = Aim(self.setting, False, False, span, middle, rows, crossing=True)
         around = np.ptp(embed_many(self.setting, self.points, own), axis=1).max(axis=1, initial=0.0)
-        return corrected(aim, z, start, around)
+        return correct_points(aim, z, start, around)
 
     def centres(self, close: Int[np.ndarray, "m 2"], p: Parameters) -> Centres:
         """Crossing points closer than `NEAR` to points, each once."""

@@ -20,8 +20,8 @@ from equimorph.manifold.lookup.exact_states import (
     exact_states,
     first_of_same,
     lift_to,
+    lifts_across_folds,
     nearest_pairs,
-    turned_back,
 )
 from equimorph.manifold.lookup.kernels import (
     balanced,
@@ -361,7 +361,9 @@ class Sheets:
         number, state = number[nearest], state[nearest]
         velocity = np.zeros((len(state), p.shape[1]))
         velocity[:, self.free] = way[number]
-        found, which = turned_back(States(self.structure, z[state], p[point[state]]), velocity)
+        found, which = lifts_across_folds(
+            States(self.structure, z[state], p[point[state]]), velocity
+        )
         found, of_found = self._exact(found, p, point[state[which]], near)
         return found, of_found
 

@@ -8,7 +8,7 @@ from jaxtyping import Float
 
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.manifold.geometry.setting import embed
-from equimorph.manifold.geometry.tangents import placed_frames
+from equimorph.manifold.geometry.tangents import frames_in_embedding
 from equimorph.manifold.queries.nearest import Ground, SetPoints
 
 SWEEPS, HALVINGS = 60, 8
@@ -76,7 +76,7 @@ class Chains:
     def _divide(self, links: int) -> None:
         """Put equidistant points on the set along the chains."""
         near = [self._equidistant(chain, links) for chain in self.chains]
-        moved, good = self.on_set.corrected(SetPoints.concatenate(near))
+        moved, good = self.on_set.project(SetPoints.concatenate(near))
         for i, chain in enumerate(near):
             # the ends are what they were, and points that are not found are left out
             begin = i * (links + 1)
@@ -138,10 +138,10 @@ class Chains:
             SetPoints.concatenate([m.inner for m in moves]),
             SetPoints.concatenate([m.last for m in moves]),
         )
-        middle, good = self.on_set.moved(inner, frames, share * np.concatenate(step))
+        middle, good = self.on_set.move(inner, frames, share * np.concatenate(step))
         there = np.ones(len(moves), bool)
         if edge.shape[1]:
-            goal, there = self.on_fold.moved(goal, edge, share * np.concatenate(end))
+            goal, there = self.on_fold.move(goal, edge, share * np.concatenate(end))
         ends = np.cumsum([len(m.step) for m in moves])[:-1]
         owns = np.split(np.arange(len(frames)), ends)
         return [
@@ -162,8 +162,8 @@ class Chains:
         inner, d = frames.shape[:2]
         k = edge.shape[1]
         # directions of all points one below the other, and whose they are
-        rows = placed_frames(self.setting, frames).reshape(inner * d, place.shape[1])
-        rows = np.concatenate([rows, placed_frames(self.setting, edge)[0]])
+        rows = frames_in_embedding(self.setting, frames).reshape(inner * d, place.shape[1])
+        rows = np.concatenate([rows, frames_in_embedding(self.setting, edge)[0]])
         owner = np.concatenate([np.repeat(np.arange(inner), d), np.full(k, inner)])
         pull = np.empty_like(place[1:])
         pull[:-1] = 2.0 * place[1:-1] - place[:-2] - place[2:]

@@ -14,7 +14,7 @@ from jaxtyping import Bool, Float, Int
 from equimorph.arrays import Flags, Lanes, Parameters, Some, Values
 from equimorph.columns import Columns
 from equimorph.manifold.geometry.setting import Setting
-from equimorph.manifold.geometry.tangents import cap_slopes, placed_frames, split_step
+from equimorph.manifold.geometry.tangents import cap_slopes, frames_in_embedding, split_step
 from equimorph.manifold.queries.nearest import Frames, Ground, SetPoints, free_steps
 from equimorph.model import worst_excess
 
@@ -178,7 +178,7 @@ class _Descent:
             face, one = self.face(held[k]), slice(k, k + 1)
             guess = SetPoints(z[one], p[one], move.spot.rows[one])
             frames, rows = face.frames(SetPoints(move.spot.z[one], move.spot.p[one], guess.rows))
-            new, good = face.moved(guess, frames, np.zeros(frames.shape[:2]))
+            new, good = face.move(guess, frames, np.zeros(frames.shape[:2]))
             norm = np.linalg.norm(self.residuals(new.z, new.p), axis=1)
             near = share[k] * np.linalg.norm(move.step[k]) < STILL
             if good[0] and (norm[0] < self.value[lane] or near):
@@ -272,7 +272,7 @@ def _second_derivatives(
     step = np.repeat(CURVING * sides, lanes, axis=0)
     each = np.tile(np.arange(lanes), 2 * k)
     many, own = spot.take(each), frames[each]
-    there, good = ground.moved(many, own, step)
+    there, good = ground.move(many, own, step)
     there = many.with_rows(np.flatnonzero(good), there.take(good))
     turned = _align(ground.setting, ground.frames(there)[0], own)
     gradient = _gradient(ground, there, turned, residuals)[0].reshape(2, k, lanes, k)
@@ -283,7 +283,7 @@ def _second_derivatives(
 
 def _align(setting: Setting, frames: Frames, others: Frames) -> Frames:
     """Frames turned in their spaces until they agree with others as well as they can."""
-    ours, theirs = (placed_frames(setting, each) for each in (frames, others))
+    ours, theirs = (frames_in_embedding(setting, each) for each in (frames, others))
     left, _, right = np.linalg.svd(ours @ np.swapaxes(theirs, 1, 2))
     return np.asarray(np.swapaxes(left @ right, 1, 2) @ frames)
 
@@ -303,7 +303,7 @@ def _shorten(
         lengths = share[todo] * (SHORTER[:1] if share[todo[0]] == 1.0 else SHORTER)[:, None]
         each = np.tile(todo, len(lengths))
         tried = lengths.reshape(-1, 1) * step[each]
-        there, good = ground.moved(spot.take(each), frames[each], tried)
+        there, good = ground.move(spot.take(each), frames[each], tried)
         size = np.linalg.norm(residuals(there.z, there.p), axis=1)
         good &= size < value[each]
         longest = good.reshape(lengths.shape).argmax(axis=0) * len(todo) + np.arange(len(todo))

@@ -123,7 +123,7 @@ def locate(
     starts = local_minima(faces_of(eset.cells, 2), misfit)[:CANDIDATES]
     ground = Ground(eset.setting, eset)
     found, value, inside = nearest(ground, points_at_vertices(eset, starts), fit.residuals)
-    chosen = different(eset.structure, found, value)[:2]
+    chosen = distinct_states(eset.structure, found, value)[:2]
     places = _places(eset, found.take(chosen), value[chosen], inside[chosen])
     return Location(places[0], places[1] if len(places) > 1 else None)
 
@@ -221,7 +221,7 @@ def _name(what: Descriptor | str) -> str:
     return what if isinstance(what, str) else what.name
 
 
-def different(
+def distinct_states(
     structure: Structure, found: SetPoints, value: Float[np.ndarray, " lanes"]
 ) -> Int[np.ndarray, " kept"]:
     """Different states, the best first."""

@@ -8,13 +8,13 @@ from jaxtyping import Float, Int
 from equimorph.arrays import Flags, Lanes, Parameters, Rows
 from equimorph.columns import Columns
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
-from equimorph.manifold.geometry.exact_points import Aim, corrected
+from equimorph.manifold.geometry.exact_points import Aim, correct_points
 from equimorph.manifold.geometry.setting import Setting, embed
 from equimorph.manifold.geometry.tangents import (
     best_corners,
     cap_slopes,
     fold_slopes,
-    placed_frames,
+    frames_in_embedding,
     split_step,
     tangent_frames,
 )
@@ -86,7 +86,7 @@ class Ground:
     def frames(self, spot: SetPoints) -> tuple[Frames, Rows]:
         """Orthonormal directions along which points may move, and bases of the tangent spaces."""
         frames = tangent_frames(self.setting, spot.z, spot.p, spot.rows)
-        rows = placed_frames(self.setting, frames)
+        rows = frames_in_embedding(self.setting, frames)
         slopes = [
             *([fold_slopes(self.setting, spot.z, spot.p, frames)] if self.fold else []),
             *(free_steps(self.setting, frames)[:, :, side] for side in self.sides),
@@ -97,22 +97,22 @@ class Ground:
             frames = np.einsum("ldk,ldf->lkf", basis, frames)
         return frames, rows
 
-    def moved(
+    def move(
         self, spot: SetPoints, frames: Frames, step: Float[np.ndarray, "lanes k"]
     ) -> tuple[SetPoints, Flags]:
         """Points of the set orthogonally above steps, and whether there are any in the box."""
         dz, dp = split_step(self.setting, np.einsum("lk,lkf->lf", step, frames))
-        rows = placed_frames(self.setting, frames)
-        there, good = self.corrected(SetPoints(spot.z + dz, spot.p + dp, rows))
+        rows = frames_in_embedding(self.setting, frames)
+        there, good = self.project(SetPoints(spot.z + dz, spot.p + dp, rows))
         return SetPoints(there.z, there.p, spot.rows), good
 
-    def corrected(self, spot: SetPoints) -> tuple[SetPoints, Flags]:
+    def project(self, spot: SetPoints) -> tuple[SetPoints, Flags]:
         """Points of the set orthogonally above points, and whether there are any in the box."""
         lanes, d = len(spot.z), len(self.setting.free)
         span = np.tile(np.delete(np.eye(d), self.sides, axis=0), (lanes, 1, 1))
         middle = embed(self.setting, spot.z, spot.p)
         aim = Aim(self.setting, self.fold, self.cap, span, middle, spot.rows)
-        pinned = corrected(aim, spot.z, spot.p, np.full(lanes, FAR))
+        pinned = correct_points(aim, spot.z, spot.p, np.full(lanes, FAR))
         good = pinned.found & self.eset.box.holds(pinned.p[:, self.setting.free], slack=1e-9)
         return SetPoints(pinned.z, pinned.p, spot.rows), good
 

@@ -80,7 +80,7 @@ def follow(
     rod: Continued, part: Part, x: Float[np.ndarray, "lanes extended"]
 ) -> tuple[Values, Float[np.ndarray, "lanes extended"]]:
     """Move x = (z, span) along a part: the share of it that was reached, 1 if all, and x there."""
-    here = corrected(rod, part, np.arange(len(x)), np.zeros(len(x)), x)[0]
+    here = correct_at_share(rod, part, np.arange(len(x)), np.zeros(len(x)), x)[0]
     before = Point(here.t.copy(), here.x.copy(), here.slope.copy())
     step = np.full(len(x), FIRST_STEP)
     for _ in range(400):
@@ -90,7 +90,7 @@ def follow(
         old = here[active]
         target = np.minimum(old.t + step[active], 1.0)
         guess = old.x if part.free else _predict(before[active], old, target)
-        new, bend = corrected(rod, part, active, target, guess)
+        new, bend = correct_at_share(rod, part, active, target, guess)
         if not part.free:
             way, off = (np.abs(new.x - x).max(axis=1) for x in (old.x, guess))
             bend = np.maximum(bend, off / np.maximum(way, 1e-6))
@@ -113,7 +113,7 @@ def _predict(before: Point, here: Point, t: Values) -> Float[np.ndarray, "lanes 
     return np.asarray(np.where(alone[:, None], line, cubic))
 
 
-def corrected(
+def correct_at_share(
     rod: Continued,
     part: Part,
     lanes: Int[np.ndarray, " lanes"],
@@ -228,7 +228,7 @@ def _continue(
         out.outcome[lanes[small[t < 1.0]]] = Outcome.SPAN_FOLD
     last = Part(start, goal, free=False, sharpening=sharpening)
     reached = np.flatnonzero(there)
-    exact = corrected(rod, last, reached, np.ones(len(reached)), x[reached])[0].x[:, :-1]
+    exact = correct_at_share(rod, last, reached, np.ones(len(reached)), x[reached])[0].x[:, :-1]
     out.z[lanes[reached]] = exact
 
 
@@ -268,7 +268,7 @@ def natural_rod(rod: GeneralMechanics, p: Parameters) -> Natural:
     out.span[here] = x[:, -1]
     out.outcome[here[share < 1.0]] = Outcome.SPAN_FOLD
     there = np.flatnonzero(share >= 1.0)
-    exact = corrected(rod, last, there, np.ones(len(there)), x[there])[0].x[:, :-1]
+    exact = correct_at_share(rod, last, there, np.ones(len(there)), x[there])[0].x[:, :-1]
     out.z[:] = np.nan
     out.z[here[there]] = exact
     return out

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from equimorph.arrays import Flags, Lanes, Parameters, Values
-from equimorph.structures.rod.natural import Part, corrected, follow
+from equimorph.structures.rod.natural import Part, correct_at_share, follow
 from equimorph.structures.spatial.ends import PLACES
 from equimorph.structures.spatial.mechanics import SpatialMechanics
 from equimorph.structures.spatial.model import ANGLES
@@ -66,7 +66,9 @@ def natural_states(rod: SpatialMechanics, p: Parameters) -> tuple[Lanes, Flags]:
     share, x = follow(rod, last, x)
     there = np.flatnonzero(share >= 1.0)
     out, found = np.full_like(z, np.nan), np.zeros(len(p), bool)
-    out[here[there]] = corrected(rod, last, there, np.ones(len(there)), x[there])[0].x[:, :-1]
+    out[here[there]] = correct_at_share(rod, last, there, np.ones(len(there)), x[there])[0].x[
+        :, :-1
+    ]
     found[here[there]] = True
     return out, found
 

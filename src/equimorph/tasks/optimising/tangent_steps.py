@@ -8,9 +8,9 @@ from jaxtyping import Float
 from equimorph.arrays import Flags, Frames, Lanes, Parameters, Rows
 from equimorph.equilibria.sensitivity import answers
 from equimorph.manifold import EquilibriumSet
-from equimorph.manifold.geometry.exact_points import Aim, corrected
+from equimorph.manifold.geometry.exact_points import Aim, correct_points
 from equimorph.manifold.geometry.setting import Setting, embed
-from equimorph.manifold.geometry.tangents import placed_frames, split_step, tangent_frames
+from equimorph.manifold.geometry.tangents import frames_in_embedding, split_step, tangent_frames
 from equimorph.manifold.queries.nearest import SetPoints
 from equimorph.structures import State
 
@@ -37,7 +37,7 @@ def unconstrained_setting(eset: EquilibriumSet) -> Setting:
 def tangents_at(setting: Setting, at: SetPoints) -> tuple[Frames, SetPoints]:
     """Orthonormal tangents at points, and the points with these as their planes."""
     frames = tangent_frames(setting, at.z, at.p, at.rows)
-    return frames, SetPoints(at.z, at.p, placed_frames(setting, frames))
+    return frames, SetPoints(at.z, at.p, frames_in_embedding(setting, frames))
 
 
 def step_along(
@@ -55,5 +55,5 @@ def project_onto_set(
     d = len(setting.free)
     span = np.tile(np.eye(d), (len(z), 1, 1))
     aim = Aim(setting, False, False, span, embed(setting, z, p), rows)
-    pinned = corrected(aim, z, p, np.full(len(z), ANYWHERE))
+    pinned = correct_points(aim, z, p, np.full(len(z), ANYWHERE))
     return SetPoints(pinned.z, pinned.p, rows), pinned.found

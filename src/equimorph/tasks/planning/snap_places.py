@@ -103,7 +103,7 @@ def _between(eset: EquilibriumSet, places: _Places, demands: Demands) -> tuple[S
     )
     ground = Ground(eset.setting, eset, fold=True)
     frames, _ = ground.frames(guess)
-    exact, found = ground.moved(guess, frames, np.zeros(frames.shape[:2]))
+    exact, found = ground.move(guess, frames, np.zeros(frames.shape[:2]))
     return _land(exact.take(found), places.landings[low[found]], demands)
 
 

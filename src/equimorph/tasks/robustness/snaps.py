@@ -267,7 +267,7 @@ class _Moves:
     def _on_folds(self, spot: SetPoints) -> tuple[SetPoints, Flags]:
         """Folds orthogonally above points, and whether there are any in the box."""
         frames, _ = self._folds.frames(spot)
-        return self._folds.moved(spot, frames, np.zeros(frames.shape[:2]))
+        return self._folds.move(spot, frames, np.zeros(frames.shape[:2]))
 
     def _spot(self, fold: State) -> SetPoints:
         """A fold, with a basis of the tangent space there."""
