@@ -35,6 +35,9 @@ FEASIBLE = 1e-7
 # Difference: steps of finite differences.
 CENTRAL_DIFFERENCE = 1e-6
 """Step of central differences, in units of the scales of what varies."""
+METRIC_DIFFERENCE = 1e-5
+"""Step of central differences along curves and tangents of the set, in the metric: their error and
+that of round-off are about 1e-11."""
 
 # Motion: what a replay in time tells apart.
 DEPARTURE = 0.05

@@ -23,6 +23,7 @@ from equimorph.manifold.geometry.tangents import frames_in_embedding, split_step
 from equimorph.manifold.lookup.exact_states import exact_states
 from equimorph.model import Descriptor, position
 from equimorph.structures import value_of
+from equimorph.tolerances import METRIC_DIFFERENCE
 
 Values = Float[np.ndarray, "lanes d"]
 
@@ -33,9 +34,6 @@ QUICK = Guards(iterations=8, longest=np.inf, too_long=0.3, converged=1e-7, contr
 ON_SET = Guards(iterations=20, longest=0.3, converged=1e-7, contraction=0.7, free=3)
 
 Square = Float[np.ndarray, "lanes d d"]
-
-CENTRAL = 1e-5
-"""Step of central differences along orthonormal tangents, in the metric."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,8 +127,10 @@ class Coordinates(Scalars):
         """Derivatives of the coordinates (rows) along tangents (columns)."""
         columns = []
         for k in range(frames.shape[1]):
-            dz, dp = split_step(self.setting, CENTRAL * frames[:, k])
-            columns.append((self(z + dz, p + dp) - self(z - dz, p - dp)) / (2.0 * CENTRAL))
+            dz, dp = split_step(self.setting, METRIC_DIFFERENCE * frames[:, k])
+            columns.append(
+                (self(z + dz, p + dp) - self(z - dz, p - dp)) / (2.0 * METRIC_DIFFERENCE)
+            )
         return np.stack(columns, axis=2)
 
     def solved(

@@ -19,7 +19,7 @@ from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.topology import adjacency, flags_of, keys_of
 from equimorph.manifold.lookup.exact_states import exact_states, root_weights
 from equimorph.manifold.queries.levels import part_of
-from equimorph.structures import States
+from equimorph.structures import States, join_states
 
 DIFFERENT = 1e-4
 """Distance in the metric from which on two states over a point are different ones."""
@@ -77,11 +77,7 @@ class Preference:
         cell = np.full(len(z), -1)
         cell[found.point[own]] = found.cell[own]
         others = found.take(~own)
-        states = States(
-            structure,
-            np.concatenate([others.states.z, z]),
-            np.concatenate([others.states.p, p]),
-        )
+        states = join_states(structure, [others.states, States(structure, z, p)])
         itself = np.arange(len(z))
         both = Found(
             states,

@@ -92,6 +92,14 @@ def first_of_each(found: Found, score: Scores, elevation: Descriptor) -> Bool[np
     return out
 
 
+def _least(word: str, descriptor: Descriptor, sign: float) -> Rule:
+    return _Least(
+        f"{word} {descriptor.name}",
+        lambda _: lambda found: sign * descriptor.function(found.states.z, found.states.p),
+        {"rule": word, "of": descriptor.name},
+    )
+
+
 @check_arguments
 def lowest(descriptor: Descriptor) -> Rule:
     """Prefer the lowest value of a descriptor, like the energy.
@@ -101,11 +109,7 @@ def lowest(descriptor: Descriptor) -> Rule:
     descriptor
         A descriptor of the set's structure.
     """
-    return _Least(
-        f"lowest {descriptor.name}",
-        lambda _: lambda found: descriptor.function(found.states.z, found.states.p),
-        {"rule": "lowest", "of": descriptor.name},
-    )
+    return _least("lowest", descriptor, 1.0)
 
 
 @check_arguments
@@ -117,11 +121,7 @@ def highest(descriptor: Descriptor) -> Rule:
     descriptor
         A descriptor of the set's structure.
     """
-    return _Least(
-        f"highest {descriptor.name}",
-        lambda _: lambda found: -descriptor.function(found.states.z, found.states.p),
-        {"rule": "highest", "of": descriptor.name},
-    )
+    return _least("highest", descriptor, -1.0)
 
 
 @check_arguments

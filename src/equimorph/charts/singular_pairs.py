@@ -22,7 +22,7 @@ from equimorph.charts.location import Cells, Found
 from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.geometry.tangents import frames_in_embedding, split_step, tangent_frames
 from equimorph.manifold.lookup.cell_index import Hits
-from equimorph.structures import States
+from equimorph.structures import States, join_states
 
 NEIGHBOURS = 4
 """Singular states from which the pair over a point is predicted."""
@@ -168,13 +168,13 @@ class SingularPairs:
 
 def _united(cells: Cells, first: Found, second: Found) -> Found:
     """States of both, equal ones once, sorted by point."""
-    structure = first.states.structure
-    z = np.concatenate([first.states.z, second.states.z])
-    p = np.concatenate([first.states.p, second.states.p])
+    states = join_states(first.states.structure, [first.states, second.states])
     point, cell, inside = (
         np.concatenate([getattr(first, name), getattr(second, name)])
         for name in ("point", "cell", "inside")
     )
-    kept = cells.one_of_each(z, p, Hits(point, cell, np.zeros((len(point), 0)), inside))
+    kept = cells.one_of_each(
+        states.z, states.p, Hits(point, cell, np.zeros((len(point), 0)), inside)
+    )
     kept = kept[np.argsort(point[kept], kind="stable")]
-    return Found(States(structure, z[kept], p[kept]), point[kept], cell[kept], inside[kept])
+    return Found(states[kept], point[kept], cell[kept], inside[kept])

@@ -39,13 +39,12 @@ from equimorph.equilibria.steps import (
 from equimorph.equilibria.trace_options import EventCode, TraceOptions
 from equimorph.model import Constraint
 from equimorph.structures import Advance
+from equimorph.tolerances import METRIC_DIFFERENCE
 
 Names = Int[np.ndarray, " lanes"]
 Span = tuple[tuple[Front, Front], tuple[float, ...]]
 """Ends of a step and their lengths on the way; see `inside_step`."""
 
-DIFFERENCE = 1e-5
-"""Step of differences along a curve, in the metric."""
 MISS = 0.1
 """Error of the largest value of a cubic inside a step, as a share of its rise above the ends."""
 AT_GOAL, FROM_GOAL = 1e-9, 1e-6
@@ -387,7 +386,7 @@ def _slope(
     tangent_t: Values,
 ) -> Values:
     """Change of a constraint's excess per length along curves."""
-    h = DIFFERENCE
+    h = METRIC_DIFFERENCE
     ahead, behind = (
         constraint.excess(*curve.states(z + s * h * tangent_z, t + s * h * tangent_t))
         for s in (1.0, -1.0)

@@ -18,6 +18,7 @@ from equimorph.errors import InputError
 from equimorph.linalg import BorderedSolution
 from equimorph.model import Descriptor
 from equimorph.structures import Advance, Structure
+from equimorph.tolerances import METRIC_DIFFERENCE
 
 Columns = Float[np.ndarray, "lanes columns"]
 Table = Float[np.ndarray, "curves pieces _ columns"]
@@ -170,9 +171,6 @@ class SmoothCurve(PlainCurve):
 
 Extended = Float[np.ndarray, "lanes extended"]
 
-DIFFERENCE = 1e-5
-"""Step of central differences: their error and that of round-off are about 1e-11."""
-
 
 @dataclass(frozen=True)
 class TrackedMetric:
@@ -304,7 +302,7 @@ class TrackedCurve:
         structure, size = self.structure, self.structure.size
         dz, dp = moves[:, :, :size], moves[:, :, size:] @ changes
         functions = tuple(descriptor.function for descriptor in self.descriptors)
-        takes = DescriptorValues(functions, self._targets(t), DIFFERENCE)
+        takes = DescriptorValues(functions, self._targets(t), METRIC_DIFFERENCE)
         move = Move(dz[:, 0], dp[:, 0], dz[:, 1:], dp[:, 1:])
         found = takes.linear(Critical(structure, z, p, z), move)
         rate = self.prescribed.rate(t)[:, len(structure.parameters) :, None] * moves[:, None, :, -1]

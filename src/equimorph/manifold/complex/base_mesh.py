@@ -7,9 +7,7 @@ from jaxtyping import Bool, Float, Int
 
 from equimorph.manifold.geometry.simplices import barycentric
 from equimorph.manifold.geometry.topology import keys_of, rows_of
-
-SLACK = 1e-12
-"""How far outside the box a point counts as inside, in ranges of the parameters."""
+from equimorph.tolerances import IN_BOX
 
 
 def _none(corners: int) -> Int[np.ndarray, "0 corners"]:
@@ -53,7 +51,7 @@ class BaseMesh:
     def covers(self, points: Float[np.ndarray, "n d"]) -> Bool[np.ndarray, " n"]:
         """Which points lie in the box, up to round-off."""
         low, high = self.vertices.min(axis=0), self.vertices.max(axis=0)
-        slack = SLACK * (high - low)
+        slack = IN_BOX * (high - low)
         return np.asarray(((points >= low - slack) & (points <= high + slack)).all(axis=1))
 
     def locate(self, point: Float[np.ndarray, " d"]) -> int:

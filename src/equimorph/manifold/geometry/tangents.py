@@ -17,11 +17,10 @@ from equimorph.manifold.geometry.kernels import square_sides
 from equimorph.manifold.geometry.points import Points
 from equimorph.manifold.geometry.setting import Setting, embed
 from equimorph.model import worst_excess
+from equimorph.tolerances import METRIC_DIFFERENCE
 
 CHUNK = 2048
 """Points whose tangent spaces are computed together: this bounds the memory."""
-DIFFERENCE = 1e-5
-"""Step of central differences along orthonormal tangents, in the metric."""
 S_SHAPE = 0.1
 """Farthest a cubic whose slopes at both ends are the same leaves its chord: √3/18, in slopes."""
 
@@ -75,11 +74,11 @@ def cap_slopes(
     """Slope along the frame of the largest excess over the constraints."""
 
     def worst(sign: float, k: int) -> Values:
-        dz, dp = split_step(setting, sign * DIFFERENCE * frames[:, k])
+        dz, dp = split_step(setting, sign * METRIC_DIFFERENCE * frames[:, k])
         return worst_excess(setting.constraints, z + dz, p + dp)
 
     slopes = [worst(1.0, k) - worst(-1.0, k) for k in range(frames.shape[1])]
-    return np.stack(slopes, axis=1) / (2.0 * DIFFERENCE)
+    return np.stack(slopes, axis=1) / (2.0 * METRIC_DIFFERENCE)
 
 
 @dataclass(frozen=True)

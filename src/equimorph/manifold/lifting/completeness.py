@@ -5,7 +5,6 @@ What is missing becomes equilibria over the vertices of the grid.
 See docs/decisions.md, "Random checks are also the last seeds".
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,7 +23,7 @@ from equimorph.manifold.lifting.pairing import Pairing
 from equimorph.manifold.lifting.seeds import Seeds, polish
 from equimorph.manifold.lookup.exact_states import lift_to
 from equimorph.model import Progress, are_feasible, position
-from equimorph.structures import States
+from equimorph.structures import States, join_states
 
 STARTS = 200
 """Random starts of Newton's method in each independent search."""
@@ -91,18 +90,14 @@ def _missing(eset: EquilibriumSet, places: list[dict[str, float]], seed: int) ->
     led, pools = descents_of_set(eset), _on_lines(eset, np.random.default_rng(seed))
     begun = len(pools.ground.p)
     met = _within(pools, pools.z[begun:], pools.group[begun:])
-    found = _together([*searched, scattered[np.flatnonzero(resolved)]])
-    lacking = _together([_lacking(each, eset) for each in (found, led.landed, met)])
+    structure = eset.structure
+    found = join_states(structure, [*searched, scattered[np.flatnonzero(resolved)]])
+    lacking = join_states(structure, [_lacking(each, eset) for each in (found, led.landed, met)])
     dropped = [each.unresolved for each in searched if each.unresolved is not None]
     dropped += [_within(pools, *each) for each in pools.unresolved]
-    left_out = _lacking(_together([*dropped, scattered[np.flatnonzero(~resolved)]]), eset)
+    dropped.append(scattered[np.flatnonzero(~resolved)])
+    left_out = _lacking(join_states(structure, dropped), eset)
     return Check(len(found), lacking, led.outcomes, len(met), len(left_out))
-
-
-def _together(parts: Sequence[States]) -> States:
-    """All states of some batches, at least one."""
-    z, p = (np.concatenate(columns) for columns in ([q.z for q in parts], [q.p for q in parts]))
-    return States(parts[0].structure, z, p)
 
 
 def _scattered(eset: EquilibriumSet, count: int, generator: np.random.Generator) -> States:
@@ -171,7 +166,7 @@ def seeds_from(
 
     Returned with them is the number of the state that each comes from.
     """
-    states = _together([missing, *_images(setting, missing)])
+    states = join_states(setting.structure, [missing, *_images(setting, missing)])
     cells = np.array([mesh.locate(point) for point in states.p[:, setting.free]], dtype=int)
     vertices = mesh.cells[cells]
     origin = np.repeat(np.arange(len(states)), vertices.shape[1])

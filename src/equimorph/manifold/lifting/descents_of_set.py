@@ -17,7 +17,7 @@ from equimorph.equilibria.settle import lower_index
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.manifold.geometry.points import VertexKind
 from equimorph.model import are_feasible
-from equimorph.structures import States
+from equimorph.structures import States, join_states
 
 VERTICES = 8
 """Vertices of each stratum that is probed, far from each other."""
@@ -81,8 +81,7 @@ def descents_of_set(eset: EquilibriumSet) -> SetDescents:
             np.append(tried.target, target, axis=1),
         )
         vertices, stratum = _between(eset, tried)
-    z, p = (np.concatenate(columns) for columns in zip(*((s.z, s.p) for s in states), strict=True))
-    return SetDescents(States(eset.structure, z, p), tuple(sorted((+outcomes).items())))
+    return SetDescents(join_states(eset.structure, states), tuple(sorted((+outcomes).items())))
 
 
 def _first(eset: EquilibriumSet) -> tuple[Some, Some]:

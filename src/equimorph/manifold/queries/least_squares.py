@@ -17,12 +17,11 @@ from equimorph.manifold.geometry.setting import Setting
 from equimorph.manifold.geometry.tangents import cap_slopes, frames_in_embedding, split_step
 from equimorph.manifold.queries.nearest import Frames, Ground, SetPoints, free_steps
 from equimorph.model import worst_excess
+from equimorph.tolerances import METRIC_DIFFERENCE
 
 Residuals = Callable[[Lanes, Parameters], Float[np.ndarray, "lanes m"]]
 Steps = Float[np.ndarray, "lanes k"]
 
-DIFFERENCE = 1e-5
-"""Step of central differences along orthonormal tangents, in the metric."""
 CURVING = 1e-3
 """Step along the set by which the change of the gradient is measured."""
 ITERATIONS, HALVINGS = 60, 12
@@ -234,11 +233,11 @@ def _gradient(
     """Gradient of ½‖r‖² along frames, and the derivative of r."""
     lanes, k = frames.shape[:2]
     # all sides at once: a call costs more than its lanes
-    steps = [split_step(ground.setting, DIFFERENCE * frames[:, i]) for i in range(k)]
+    steps = [split_step(ground.setting, METRIC_DIFFERENCE * frames[:, i]) for i in range(k)]
     sides = [(spot.z + s * dz, spot.p + s * dp) for dz, dp in steps for s in (1.0, -1.0)]
     z, p = (np.concatenate(each) for each in zip((spot.z, spot.p), *sides, strict=True))
     values = residuals(z, p).reshape(1 + 2 * k, lanes, -1)
-    slope = np.moveaxis(values[1::2] - values[2::2], 0, 2) / (2.0 * DIFFERENCE)
+    slope = np.moveaxis(values[1::2] - values[2::2], 0, 2) / (2.0 * METRIC_DIFFERENCE)
     return np.einsum("lmk,lm->lk", slope, values[0]), slope
 
 

@@ -11,13 +11,10 @@ from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.geometry.exact_points import Aim, correct_points
 from equimorph.manifold.geometry.setting import Setting, embed
 from equimorph.manifold.geometry.tangents import frames_in_embedding, split_step, tangent_frames
-from equimorph.manifold.queries.nearest import SetPoints
+from equimorph.manifold.queries.nearest import FAR, SetPoints
 from equimorph.structures import State
 
 Steps = Float[np.ndarray, "lanes d"]
-
-ANYWHERE = 1e3
-"""Distance from its guess within which a corrected point will do."""
 
 
 def tangent_plane_at(setting: Setting, state: State) -> Float[np.ndarray, "1 d coordinates"]:
@@ -55,5 +52,5 @@ def project_onto_set(
     d = len(setting.free)
     span = np.tile(np.eye(d), (len(z), 1, 1))
     aim = Aim(setting, False, False, span, embed(setting, z, p), rows)
-    pinned = correct_points(aim, z, p, np.full(len(z), ANYWHERE))
+    pinned = correct_points(aim, z, p, np.full(len(z), FAR))
     return SetPoints(pinned.z, pinned.p, rows), pinned.found
