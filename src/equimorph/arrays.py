@@ -39,3 +39,33 @@ Some = Int[np.ndarray, " some"]
 """Numbers of selected rows."""
 Pair = Float[np.ndarray, " 2"]
 """Two numbers."""
+
+# one row for each of n things: vertices, edges, cells, points
+Numbers = Int[np.ndarray, " lanes"]
+"""A whole number a lane."""
+Items = Int[np.ndarray, " n"]
+"""A whole number for each of n things."""
+ItemFlags = Bool[np.ndarray, " n"]
+"""A truth value for each of n things."""
+ItemValues = Float[np.ndarray, " n"]
+"""A scalar for each of n things."""
+VertexFlags = Bool[np.ndarray, " V"]
+"""A truth value for each vertex of a complex."""
+VertexNumbers = Int[np.ndarray, " V"]
+"""A whole number for each vertex of a complex."""
+CellFlags = Bool[np.ndarray, " C"]
+"""A truth value for each cell of a complex."""
+CellNumbers = Int[np.ndarray, " C"]
+"""A whole number for each cell of a complex."""
+EdgeFlags = Bool[np.ndarray, " E"]
+"""A truth value for each edge of a complex."""
+Place = Float[np.ndarray, " d"]
+"""A point in the space of the free parameters."""
+Places = Float[np.ndarray, "n d"]
+"""Points in the space of the free parameters, one for each of n things."""
+Pairs = Int[np.ndarray, "n 2"]
+"""Two numbers for each of n things, such as the ends of edges."""
+Facets = Int[np.ndarray, "n d"]
+"""Numbers of the vertices of n facets."""
+Triples = Int[np.ndarray, "n 3"]
+"""Three numbers for each of n things, such as the corners of triangles."""

@@ -7,7 +7,7 @@ exactly. An edge that passes a vertex within one spacing is bent to pass through
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from equimorph.arrays import Edges
+from equimorph.arrays import Edges, ItemFlags, ItemValues
 
 Places = Float[np.ndarray, "places 2"]
 Jumps = Int[np.ndarray, " edges"]
@@ -215,9 +215,7 @@ def _near_pairs(
     return first[keep], second[keep]
 
 
-def _interior(
-    fraction: Float[np.ndarray, " n"], along: Float[np.ndarray, "n 2"]
-) -> Bool[np.ndarray, " n"]:
+def _interior(fraction: ItemValues, along: Float[np.ndarray, "n 2"]) -> ItemFlags:
     """Whether a place on an edge lies off both ends by more than rounding."""
     return np.asarray(np.minimum(fraction, 1 - fraction) * np.hypot(*along.T) > 0.5)
 

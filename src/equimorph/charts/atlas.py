@@ -5,10 +5,10 @@ from functools import cached_property
 from itertools import combinations
 
 import numpy as np
-from jaxtyping import Bool, Int
+from jaxtyping import Int
 
 from equimorph.argument_checks import check_arguments
-from equimorph.arrays import Points
+from equimorph.arrays import CellNumbers, ItemFlags, Items, Points
 from equimorph.charts.chart import Chart
 from equimorph.charts.coordinates import Coordinates, coordinates_of
 from equimorph.charts.location import Cells, EdgeKind, Found
@@ -137,8 +137,8 @@ class Atlas:
     """
 
     eset: EquilibriumSet
-    chart: Int[np.ndarray, " C"]
-    family: Int[np.ndarray, " C"]
+    chart: CellNumbers
+    family: CellNumbers
 
     def __repr__(self) -> str:
         """How many charts and transitions."""
@@ -230,7 +230,7 @@ class Atlas:
         return out
 
     @check_arguments
-    def locate(self, states: States | State) -> tuple[Int[np.ndarray, " n"], Points]:
+    def locate(self, states: States | State) -> tuple[Items, Points]:
         """Numbers of the charts of states, −1 without a chart, and their coordinates."""
         batch = states.batch if isinstance(states, State) else states
         points = self.coordinates(batch.z, batch.p)
@@ -238,7 +238,7 @@ class Atlas:
         return np.where(cell >= 0, self.chart[cell], -1), points
 
     @check_arguments
-    def cell_of(self, batch: States) -> Int[np.ndarray, " n"]:
+    def cell_of(self, batch: States) -> Items:
         """Cell that each state lies on, −1 if none."""
         points = self.coordinates(batch.z, batch.p)
         everything = Cells(self.eset, self.coordinates, np.arange(len(self.eset.cells)))
@@ -251,7 +251,7 @@ class Atlas:
         )
         order = np.lexsort((gap, found.point))
         first = order[np.diff(found.point[order], prepend=-1) > 0]
-        near: Bool[np.ndarray, " n"] = gap[first] < SAME_SOLUTION
+        near: ItemFlags = gap[first] < SAME_SOLUTION
         cell = np.full(len(batch), -1)
         cell[found.point[first[near]]] = found.cell[first[near]]
         return cell

@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from equimorph.argument_checks import check_arguments
-from equimorph.arrays import Points
+from equimorph.arrays import Facets, ItemValues, Place, Places, Points, Some
 from equimorph.charts.domain import Domain, kinds_along, without_slivers
 from equimorph.charts.location import Cells, EdgeKind, facet_kinds
 from equimorph.charts.preference import Preference
@@ -61,7 +61,7 @@ class Barrier:
         return f"Barrier({self.kind}: {len(self.points)} points, jumps {low:.3g} to {high:.3g})"
 
     @check_arguments
-    def distance(self, points: Points, size: Float[np.ndarray, " d"]) -> Float[np.ndarray, " n"]:
+    def distance(self, points: Points, size: Place) -> ItemValues:
         """Distance of points from it as it is drawn, in units of `size`."""
         if self.points.shape[1] != 2 or len(self.points) < 2:
             gap = (points[:, None] - self.points) / size
@@ -116,10 +116,7 @@ def barriers_of(cells: Cells, preference: Preference) -> tuple[Barrier, ...]:
 
 
 def _across(
-    cells: Cells,
-    facets: Int[np.ndarray, "n d"],
-    used: Int[np.ndarray, " some"],
-    preference: Preference,
+    cells: Cells, facets: Facets, used: Some, preference: Preference
 ) -> tuple[Float[np.ndarray, "some size"], Float[np.ndarray, "some P"], Float[np.ndarray, " some"]]:
     """Preferred states just across vertices of the boundary, and their distances; ∞ if none."""
     eset, structure = cells.eset, cells.eset.structure
@@ -133,12 +130,7 @@ def _across(
     return z, p, np.where(np.isfinite(gap), gap, np.inf)
 
 
-def _outward(
-    cells: Cells,
-    facets: Int[np.ndarray, "n d"],
-    used: Int[np.ndarray, " some"],
-    size: Float[np.ndarray, " d"],
-) -> Float[np.ndarray, "some d"]:
+def _outward(cells: Cells, facets: Facets, used: Some, size: Place) -> Float[np.ndarray, "some d"]:
     """Directions at vertices of the boundary that point out of the adjacent cells."""
     whole = cells.whole
     base = int(whole.facets.max()) + 1
@@ -164,9 +156,7 @@ def _outward(
     return np.asarray(out / np.maximum(np.linalg.norm(out, axis=1, keepdims=True), 1e-300))
 
 
-def _within(
-    box: Box, points: Points, directions: Float[np.ndarray, "n d"]
-) -> Float[np.ndarray, "n d"]:
+def _within(box: Box, points: Points, directions: Places) -> Places:
     """Directions from points that do not lead out of the box."""
     size = box.upper - box.lower
     low, high = points <= box.lower + ASIDE * size, points >= box.upper - ASIDE * size
@@ -198,14 +188,14 @@ def _each_once(found: list[Barrier], cells: Cells) -> tuple[Barrier, ...]:
     return tuple(kept)
 
 
-def _extent(barrier: Barrier, size: Float[np.ndarray, " d"]) -> float:
+def _extent(barrier: Barrier, size: Place) -> float:
     """Extent of a barrier in units of `size`; single points are no shorter than they can be."""
     if barrier.points.shape[1] == 1:
         return np.inf
     return float((np.ptp(barrier.points, axis=0) / size).max())
 
 
-def gaps_of(domain: Domain, box: Box, cell: Float[np.ndarray, " d"]) -> Domain:
+def gaps_of(domain: Domain, box: Box, cell: Place) -> Domain:
     """What a domain leaves of a box, but for slivers thinner than a share of a cell."""
     names = domain.names
     low, high = box.lower, box.upper

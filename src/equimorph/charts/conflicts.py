@@ -8,6 +8,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import breadth_first_order, dijkstra, maximum_flow
 from scipy.spatial import cKDTree
 
+from equimorph.arrays import Pairs
 from equimorph.charts.location import Cells
 from equimorph.manifold.geometry.topology import labels
 from equimorph.manifold.lookup.cell_index import CellIndex
@@ -50,7 +51,7 @@ def conflicts_of(cells: Cells) -> Conflicts:
     return Conflicts(np.where(inside, _colour_groups(group, pairs)[group], -1))
 
 
-def overlapping(cells: Cells) -> Int[np.ndarray, "n 2"]:
+def overlapping(cells: Cells) -> Pairs:
     """Pairs of cells without a common vertex that lie over each other.
 
     Over two parameters by separating axes, over three where one holds the middle of the other. At a
@@ -89,7 +90,7 @@ def _inward(corners: Float[np.ndarray, "C 3 2"]) -> Float[np.ndarray, "C 3 2"]:
     return np.asarray(normal * np.sign((normal * third).sum(axis=2))[..., None])
 
 
-def _near_pairs(corners: Float[np.ndarray, "C 3 2"]) -> Int[np.ndarray, "n 2"]:
+def _near_pairs(corners: Float[np.ndarray, "C 3 2"]) -> Pairs:
     """Pairs of cells whose circles around their middles meet, by classes of size."""
     middle = corners.mean(axis=1)
     radius = np.linalg.norm(corners - middle[:, None], axis=2).max(axis=1)
@@ -109,10 +110,7 @@ def _near_pairs(corners: Float[np.ndarray, "C 3 2"]) -> Int[np.ndarray, "n 2"]:
 
 
 def _split(
-    cells: Cells,
-    group: Int[np.ndarray, " own"],
-    pairs: Int[np.ndarray, "n 2"],
-    links: Int[np.ndarray, "m 2"],
+    cells: Cells, group: Int[np.ndarray, " own"], pairs: Pairs, links: Int[np.ndarray, "m 2"]
 ) -> Int[np.ndarray, " own"]:
     """Groups that lie over themselves are parted between the ends of their longest overlap."""
     middle = cells.values[cells.corners].mean(axis=1)
@@ -133,7 +131,7 @@ def _split(
         group = np.where((group == which) & (ends[1] < ends[0]), group.max() + 1, group)
 
 
-def _colour_groups(group: Int[np.ndarray, " own"], pairs: Int[np.ndarray, "n 2"]) -> np.ndarray:
+def _colour_groups(group: Int[np.ndarray, " own"], pairs: Pairs) -> np.ndarray:
     """Colour of each group: the least that no group over or under it has, the largest first."""
     edges = np.unique(np.sort(group[pairs], axis=1), axis=0)
     size = np.bincount(group)

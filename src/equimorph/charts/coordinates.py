@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from equimorph.arrays import Flags, Frames, Lanes, Parameters, Rows, Some
+from equimorph.arrays import Flags, Frames, Lanes, Numbers, Parameters, Rows, Some
 from equimorph.equilibria.point_conditions import Values as TargetValues
 from equimorph.equilibria.settle import (
     Guards,
@@ -134,13 +134,8 @@ class Coordinates(Scalars):
         return np.stack(columns, axis=2)
 
     def solved(
-        self,
-        z: Lanes,
-        p: Parameters,
-        wanted: Values,
-        planes: Callable[[Int[np.ndarray, " some"]], Rows],
-        folded: Flags,
-    ) -> tuple[Lanes, Parameters, Flags, Int[np.ndarray, " lanes"]]:
+        self, z: Lanes, p: Parameters, wanted: Values, planes: Callable[[Some], Rows], folded: Flags
+    ) -> tuple[Lanes, Parameters, Flags, Numbers]:
         """States with given coordinates near guesses, whether they were found, and their index.
 
         Parameters

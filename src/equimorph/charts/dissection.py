@@ -4,9 +4,10 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Int
 
 from equimorph.argument_checks import check_arguments
+from equimorph.arrays import CellNumbers, ItemValues, Pairs
 from equimorph.charts.atlas import Atlas
 from equimorph.charts.chart import check_cells
 from equimorph.charts.conflicts import conflicts_of, least_cut
@@ -147,7 +148,7 @@ class _Work:
         label[own[side]] = number
         return self._relabel(label, chart), [chart, number]
 
-    def _relabel(self, label: Int[np.ndarray, " C"], chart: int) -> "_Work":
+    def _relabel(self, label: CellNumbers, chart: int) -> "_Work":
         more = int(label.max()) + 1 - len(self.origin)
         origin = np.concatenate([self.origin, np.full(max(more, 0), self.origin[chart])])
         return replace(self, fabric=replace(self.fabric, cell_index=label), origin=origin)
@@ -245,9 +246,7 @@ def _start_at_cusp(
     return path
 
 
-def _insert_crossings(
-    fabric: Fabric, ways: list[Way]
-) -> tuple[Fabric, Int[np.ndarray, "n 2"]] | None:
+def _insert_crossings(fabric: Fabric, ways: list[Way]) -> tuple[Fabric, Pairs] | None:
     """The fabric with exact vertices where straight ways cross edges, and the edges along them."""
     crossings: dict[tuple[int, int], float] = {}
     for a, b, share in (step for way in ways for step in way if not isinstance(step, int)):
@@ -275,9 +274,7 @@ def _numbers(way: Way, number: dict[tuple[int, int], int]) -> list[int]:
     return [step if isinstance(step, int) else number[min(step[:2]), max(step[:2])] for step in way]
 
 
-def _amid(
-    fabric: Fabric, ends: Int[np.ndarray, "n 2"], share: Float[np.ndarray, " n"]
-) -> Vertices | None:
+def _amid(fabric: Fabric, ends: Pairs, share: ItemValues) -> Vertices | None:
     """Exact vertices over points between the ends of edges, if there are any."""
     store, setting = fabric.vertices, fabric.setting
     weights = np.stack([1.0 - share, share], axis=1)

@@ -9,7 +9,7 @@ from jaxtyping import Bool, Float, Int
 from scipy.spatial import cKDTree
 
 from equimorph.argument_checks import check_arguments
-from equimorph.arrays import Points
+from equimorph.arrays import Place, Points
 from equimorph.charts.arrangement import cross, outline, winding
 from equimorph.charts.location import Cells, EdgeKind, facet_kinds
 from equimorph.charts.regions import Regions, regions_within
@@ -305,7 +305,7 @@ def _domain_inside(cells: Cells, loops: tuple[Loop, ...], drawn: Int[np.ndarray,
     return Domain(cells.coordinates.names, kept, along)
 
 
-def typical_extent(cells: Cells) -> Float[np.ndarray, " d"]:
+def typical_extent(cells: Cells) -> Place:
     """Median extent of the cells along each coordinate."""
     extent = np.ptp(cells.values[cells.corners], axis=1)
     return np.asarray(np.maximum(np.median(extent, axis=0), 1e-300))

@@ -7,7 +7,17 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from equimorph.arrays import Flags, Lanes, Parameters, Points
+from equimorph.arrays import (
+    Facets,
+    Flags,
+    Items,
+    Lanes,
+    Numbers,
+    Parameters,
+    Points,
+    Some,
+    VertexFlags,
+)
 from equimorph.charts.coordinates import Coordinates
 from equimorph.equilibria import ParameterLine, TraceOptions
 from equimorph.equilibria.trace import trace
@@ -64,7 +74,7 @@ class Found:
     cell: Int[np.ndarray, " found"]
     inside: Bool[np.ndarray, " found"]
 
-    def take(self, some: Bool[np.ndarray, " found"] | Int[np.ndarray, " some"]) -> "Found":
+    def take(self, some: Bool[np.ndarray, " found"] | Some) -> "Found":
         """Some of the states."""
         return Found(self.states[some], self.point[some], self.cell[some], self.inside[some])
 
@@ -88,7 +98,7 @@ class Cells:
     eset: EquilibriumSet
     coordinates: Coordinates
     numbers: Int[np.ndarray, " own"]
-    cut: Bool[np.ndarray, " V"] | None = None
+    cut: VertexFlags | None = None
 
     @cached_property
     def values(self) -> Float[np.ndarray, "V d"]:
@@ -151,7 +161,7 @@ class Cells:
         return np.asarray(np.isin(self.eset.kinds, SINGULAR)[self.corners].any(axis=1))
 
     @cached_property
-    def _folded(self) -> Bool[np.ndarray, " V"]:
+    def _folded(self) -> VertexFlags:
         """Vertices from which states move like the root of the way."""
         return np.isin(self.eset.kinds, SINGULAR) & self.coordinates.projecting
 
@@ -206,19 +216,12 @@ class Cells:
         good[some] = moved <= 2.0 * self.sizes[hits.cell[some]] + SAME_STATE
         return z, p, self._in_cells(z, p, good, index, hits.cell)
 
-    def hold(
-        self, states: States, index: Int[np.ndarray, " n"], cell: Int[np.ndarray, " n"]
-    ) -> Flags:
+    def hold(self, states: States, index: Items, cell: Items) -> Flags:
         """Whether states of some indices may lie on cells, given by their places among these."""
         return self._in_cells(states.z, states.p, np.ones(len(states), bool), index, cell)
 
     def _in_cells(
-        self,
-        z: Lanes,
-        p: Parameters,
-        good: Flags,
-        index: Int[np.ndarray, " lanes"],
-        cell: Int[np.ndarray, " lanes"],
+        self, z: Lanes, p: Parameters, good: Flags, index: Numbers, cell: Numbers
     ) -> Flags:
         low, high = self._indices
         good = good & (index >= low[cell]) & (index <= high[cell])
@@ -245,22 +248,14 @@ class Cells:
         basis = np.linalg.qr(np.swapaxes(self._frames[some], 1, 2))[0]
         return np.ascontiguousarray(np.swapaxes(basis, 1, 2)[back])
 
-    def _doubtful(
-        self, hits: Hits, good: Bool[np.ndarray, " hits"], count: int
-    ) -> Int[np.ndarray, " n"]:
+    def _doubtful(self, hits: Hits, good: Bool[np.ndarray, " hits"], count: int) -> Items:
         """Failed hits of cells that contain the point, or of points without a state."""
         states = np.bincount(hits.point[good], minlength=count)
         wanted = np.bincount(hits.point[hits.inside], minlength=count)
         return np.flatnonzero(~good & (states < np.maximum(wanted, 1))[hits.point])
 
     def _again(
-        self,
-        hits: Hits,
-        z: Lanes,
-        p: Parameters,
-        good: Flags,
-        again: Int[np.ndarray, " n"],
-        points: Points,
+        self, hits: Hits, z: Lanes, p: Parameters, good: Flags, again: Items, points: Points
     ) -> tuple[Lanes, Parameters, Flags]:
         """Try undecided hits from regular corners of their cells, by lifts or by Newton.
 
@@ -282,10 +277,7 @@ class Cells:
         return z, p, good
 
     def _from_corners(
-        self,
-        corner: Int[np.ndarray, " lanes"],
-        wanted: Float[np.ndarray, "lanes d"],
-        hits: Hits,
+        self, corner: Numbers, wanted: Float[np.ndarray, "lanes d"], hits: Hits
     ) -> tuple[Lanes, Parameters, Flags]:
         start = self.eset.points[corner]
         if not self.coordinates.projecting:
@@ -318,7 +310,7 @@ class Cells:
         return np.sort(order[first])
 
 
-def facet_kinds(cells: Cells) -> tuple[Int[np.ndarray, "n d"], np.ndarray]:
+def facet_kinds(cells: Cells) -> tuple[Facets, np.ndarray]:
     """Facets where the cells end or the coordinates fold, and what they lie on.
 
     "fold" of the set, "crossing" of other sheets, "cap" (a constraint), "box", "cut" (other cells

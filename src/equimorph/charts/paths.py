@@ -5,10 +5,11 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 
+from equimorph.arrays import CellFlags, CellNumbers, VertexFlags
 from equimorph.charts.preparation import first_copies
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.geometry.points import VertexKind
@@ -70,10 +71,7 @@ class Place:
 
 
 def path_over_cells(
-    eset: EquilibriumSet,
-    chart: Int[np.ndarray, " C"],
-    start: Place,
-    goal: Place,
+    eset: EquilibriumSet, chart: CellNumbers, start: Place, goal: Place
 ) -> AtlasPath | None:
     """Short path between two places; None if the set does not connect them.
 
@@ -129,7 +127,7 @@ def _over_edges(eset: EquilibriumSet, start: Place, goal: Place) -> list[int] | 
     return path[::-1]
 
 
-def _at_end(eset: EquilibriumSet) -> Bool[np.ndarray, " V"]:
+def _at_end(eset: EquilibriumSet) -> VertexFlags:
     """Vertices on folds at which the set ends: no way should touch them."""
     whole, at = adjacency(eset.cells), np.zeros(len(eset.points), bool)
     at[whole.facets[whole.counts == 1]] = True
@@ -170,9 +168,7 @@ def _states_on(eset: EquilibriumSet, way: Way) -> States:
     return States(eset.structure, z[kept], p[kept])
 
 
-def _charts_of(
-    eset: EquilibriumSet, chart: Int[np.ndarray, " C"], way: Way
-) -> Int[np.ndarray, " steps"]:
+def _charts_of(eset: EquilibriumSet, chart: CellNumbers, way: Way) -> Int[np.ndarray, " steps"]:
     """Chart of each step of a way: that of a cell which holds both of its ends."""
     out: list[int] = []
     for one, other in pairwise(way):
@@ -200,7 +196,7 @@ class Walker:
 
     corners: Int[np.ndarray, "C 3"]
     places: Float[np.ndarray, "V 2"]
-    allowed: Bool[np.ndarray, " C"]
+    allowed: CellFlags
 
     @cached_property
     def _whole(self) -> Adjacency:

@@ -5,9 +5,20 @@ from dataclasses import dataclass, replace
 from itertools import permutations
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float
 
-from equimorph.arrays import Flags, Lanes, Parameters, Points, Values
+from equimorph.arrays import (
+    CellFlags,
+    Flags,
+    ItemFlags,
+    Items,
+    ItemValues,
+    Lanes,
+    Parameters,
+    Points,
+    Values,
+    VertexFlags,
+)
 from equimorph.charts.location import Cells, Found
 from equimorph.charts.rules import Chooser, Scoring
 from equimorph.manifold import EquilibriumSet
@@ -29,8 +40,8 @@ distance of its state there: at a cusp it is the cube root of the first."""
 PARTS, ROUNDS = 5, 11
 """Parts and rounds of the division of edges: the change is located to 5⁻¹¹ = 2e-8 of an edge."""
 
-Solved = tuple[Lanes, Parameters, Bool[np.ndarray, " n"]]
-Way = Callable[[Int[np.ndarray, " n"], Float[np.ndarray, " n"]], Solved]
+Solved = tuple[Lanes, Parameters, ItemFlags]
+Way = Callable[[Items, ItemValues], Solved]
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +99,7 @@ class Preference:
         return both, points
 
 
-def preferred_part(preference: Preference) -> tuple[EquilibriumSet, Bool[np.ndarray, " V"], int]:
+def preferred_part(preference: Preference) -> tuple[EquilibriumSet, VertexFlags, int]:
     """The preferred part of a set, which of its vertices lie on cuts, and edges without a cut."""
     eset = preference.cells.eset
     fabric = fabric_of(eset)
@@ -132,13 +143,8 @@ class _Crossings:
         self._keys, self._found = np.concatenate(keys), found
 
     def between(
-        self,
-        fabric: Fabric,
-        ends: Ends,
-        mark: int,
-        index: Int[np.ndarray, " n"],
-        known: Float[np.ndarray, "n 2"],
-    ) -> tuple[Bool[np.ndarray, " n"], Vertices]:
+        self, fabric: Fabric, ends: Ends, mark: int, index: Items, known: Float[np.ndarray, "n 2"]
+    ) -> tuple[ItemFlags, Vertices]:
         """Those on some edges; see `cut_between`."""
         del fabric, mark, index, known
         wanted = keys_of(ends, self._base)
@@ -147,7 +153,7 @@ class _Crossings:
         return done, self._found.take(order[np.searchsorted(self._keys[order], wanted[done])])
 
 
-def _only(fabric: Fabric, cells: Bool[np.ndarray, " C"]) -> Fabric:
+def _only(fabric: Fabric, cells: CellFlags) -> Fabric:
     """Some cells of a fabric, with their facets."""
     own = flags_of(fabric.facets, adjacency(fabric.cells[cells]).facets)
     return replace(fabric.only(cells), facets=fabric.facets[own], marks=fabric.marks[own])
@@ -182,7 +188,7 @@ def _signs(preference: Preference) -> Float[np.ndarray, " V"]:
     return values
 
 
-def _preferred_beside(preference: Preference, met: Int[np.ndarray, " n"]) -> Bool[np.ndarray, " n"]:
+def _preferred_beside(preference: Preference, met: Items) -> ItemFlags:
     """Whether the sheet of each vertex at a crossing is preferred next to that vertex."""
     eset, corners = preference.cells.eset, preference.cells.corners
     out = np.zeros(len(met), bool)
@@ -205,14 +211,14 @@ def _locate_changes(
     fabric: Fabric,
     ends: Ends,
     mark: int,
-    index: Int[np.ndarray, " n"],
+    index: Items,
     values: Float[np.ndarray, "n 2"],
-) -> tuple[Bool[np.ndarray, " n"], Vertices]:
+) -> tuple[ItemFlags, Vertices]:
     """Vertices on edges where the preference changes first on the way from their first ends."""
     way = _straight(fabric, ends, mark, index)
     low, high = np.zeros(len(ends)), np.ones(len(ends))
-    first: Bool[np.ndarray, " n"] = values[:, 0] < 0.0
-    todo: Int[np.ndarray, " n"] = np.arange(len(ends))
+    first: ItemFlags = values[:, 0] < 0.0
+    todo: Items = np.arange(len(ends))
     shares = np.arange(1, PARTS) / PARTS
     for _ in range(ROUNDS):
         if len(todo) == 0:
@@ -236,13 +242,13 @@ def _locate_changes(
     return done, _vertices(fabric, ends[done], index[done], z[good], p[good])
 
 
-def _straight(fabric: Fabric, ends: Ends, mark: int, wanted: Int[np.ndarray, " n"]) -> Way:
+def _straight(fabric: Fabric, ends: Ends, mark: int, wanted: Items) -> Way:
     """States over straight lines between the ends of edges; those on constraints stay on them."""
     store, structure = fabric.vertices, fabric.setting.structure
     folded = np.isin(store.kinds[ends], (VertexKind.FOLD, VertexKind.CORNER))
     bent = np.full(len(ends), bool(mark & (FacetMark.CAP | FacetMark.FOLD))) | folded.all(axis=1)
 
-    def way(lanes: Int[np.ndarray, " n"], t: Float[np.ndarray, " n"]) -> Solved:
+    def way(lanes: Items, t: ItemValues) -> Solved:
         weights = np.stack([1.0 - t, t], axis=1)
         p = np.einsum("nk,nkp->np", weights, store.p[ends[lanes]])
         some = np.flatnonzero(folded[lanes].any(axis=1) & ~folded[lanes].all(axis=1))
@@ -262,9 +268,7 @@ def _straight(fabric: Fabric, ends: Ends, mark: int, wanted: Int[np.ndarray, " n
     return way
 
 
-def _vertices(
-    fabric: Fabric, ends: Ends, index: Int[np.ndarray, " n"], z: Lanes, p: Parameters
-) -> Vertices:
+def _vertices(fabric: Fabric, ends: Ends, index: Items, z: Lanes, p: Parameters) -> Vertices:
     """Vertices on edges, on the same folds and caps as both ends."""
     store = fabric.vertices
     kinds = store.kinds[ends]

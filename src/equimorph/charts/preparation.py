@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from equimorph.arrays import Facets, ItemFlags, Items, Pairs, VertexNumbers
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.complex.marked_complex import Fabric, fabric_of
 from equimorph.manifold.geometry.points import VertexKind
@@ -51,7 +52,7 @@ def crossing_facets(eset: EquilibriumSet, whole: Adjacency) -> Bool[np.ndarray, 
     return np.asarray(met & (whole.counts == 1) & ~_on_box(eset, whole.facets))
 
 
-def first_copies(eset: EquilibriumSet) -> Int[np.ndarray, " V"]:
+def first_copies(eset: EquilibriumSet) -> VertexNumbers:
     """For each vertex the first one that is the same state."""
     own = np.arange(len(eset.points))
     met = np.flatnonzero(eset.kinds == VertexKind.CROSSING)
@@ -62,7 +63,7 @@ def first_copies(eset: EquilibriumSet) -> Int[np.ndarray, " V"]:
     return own
 
 
-def _on_box(eset: EquilibriumSet, facets: Int[np.ndarray, "n d"]) -> Bool[np.ndarray, " n"]:
+def _on_box(eset: EquilibriumSet, facets: Facets) -> ItemFlags:
     """Whether facets lie on a side of the box; points in one dimension never do."""
     size = eset.box.upper - eset.box.lower
     places, out = eset.coordinates[facets], np.zeros(len(facets), bool)
@@ -71,7 +72,7 @@ def _on_box(eset: EquilibriumSet, facets: Int[np.ndarray, "n d"]) -> Bool[np.nda
     return out
 
 
-def _facets(curves: tuple[Int[np.ndarray, "..."], ...], d: int) -> Int[np.ndarray, "n d"]:
+def _facets(curves: tuple[Int[np.ndarray, "..."], ...], d: int) -> Facets:
     parts = [np.stack([c[:-1], c[1:]], axis=1) if d == 2 else c.reshape(-1, d) for c in curves]
     return np.concatenate([np.zeros((0, d), int), *parts])
 
@@ -97,9 +98,7 @@ def with_cusp_vertices(eset: EquilibriumSet) -> EquilibriumSet:
 
 
 def flip_inverted_triangles(
-    corners: Int[np.ndarray, "C 3"],
-    places: Float[np.ndarray, "V 2"],
-    fixed: Int[np.ndarray, "n 2"],
+    corners: Int[np.ndarray, "C 3"], places: Float[np.ndarray, "V 2"], fixed: Pairs
 ) -> Int[np.ndarray, "C 3"]:
     """Flip edges so that fewer triangles overlap their neighbours in the plane.
 
@@ -131,10 +130,7 @@ def flip_inverted_triangles(
 
 
 def _flip_once(
-    corners: Int[np.ndarray, "C 3"],
-    places: Float[np.ndarray, "V 2"],
-    bad: Int[np.ndarray, " n"],
-    kept: set[int],
+    corners: Int[np.ndarray, "C 3"], places: Float[np.ndarray, "V 2"], bad: Items, kept: set[int]
 ) -> int:
     """Flip an edge of each bad triangle where that helps; changes `corners`."""
     around: dict[int, list[int]] = {}

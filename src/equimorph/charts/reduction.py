@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Bool, Int
 
 from equimorph.argument_checks import check_arguments
-from equimorph.arrays import Points
+from equimorph.arrays import Points, VertexFlags
 from equimorph.charts.barriers import Barrier, barriers_of, gaps_of
 from equimorph.charts.chart import Chart, Charted, PointStatus, check_cells
 from equimorph.charts.coordinates import Coordinates, coordinates_of
@@ -59,7 +59,7 @@ class Reduction(Chart):
     whole: EquilibriumSet
     rule: Rule
     among: Int[np.ndarray, " own"]
-    cut: Bool[np.ndarray, " V"]
+    cut: VertexFlags
     barriers: tuple[Barrier, ...]
     lost: int
 
@@ -129,10 +129,7 @@ class Reduction(Chart):
 
 @check_arguments
 def reduce(
-    eset: EquilibriumSet,
-    *,
-    prefer: Rule | Callable[[States], Scores],
-    stable: bool = True,
+    eset: EquilibriumSet, *, prefer: Rule | Callable[[States], Scores], stable: bool = True
 ) -> Reduction:
     """Reduce a set to at most one preferred state over each point.
 

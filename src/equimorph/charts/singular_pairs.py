@@ -13,10 +13,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 from scipy.spatial import cKDTree
 
-from equimorph.arrays import Frames, Points
+from equimorph.arrays import Frames, Items, Place, Places, Points
 from equimorph.charts.coordinates import Coordinates, solve_on_the_set
 from equimorph.charts.location import Cells, Found
 from equimorph.manifold.geometry.setting import embed
@@ -31,7 +31,7 @@ REACH = 1.0
 STEP = 1e-3
 """Step of the differences of the Jacobian along its null direction, in the metric."""
 
-Numbers = Int[np.ndarray, " n"]
+Numbers = Items
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +68,7 @@ class SingularPairs:
         return self.cells.coordinates
 
     @cached_property
-    def _ranges(self) -> Float[np.ndarray, " d"]:
+    def _ranges(self) -> Place:
         return np.asarray(np.maximum(np.ptp(self.cells.values, axis=0), 1e-300))
 
     @cached_property
@@ -143,7 +143,7 @@ class SingularPairs:
     def _longest(self) -> float:
         return REACH * float(self.cells.sizes.max())
 
-    def _predicted(self, points: Points) -> tuple[Numbers, Numbers, Float[np.ndarray, "n d"]]:
+    def _predicted(self, points: Points) -> tuple[Numbers, Numbers, Places]:
         """Points with a pair near by, the singular states it is predicted from, and the steps."""
         count, d = min(NEIGHBOURS, len(self.states)), points.shape[1]
         scaled, bend = points / self._ranges, self._bend

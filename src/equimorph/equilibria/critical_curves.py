@@ -87,11 +87,7 @@ class CriticalCurve:
 
 
 def both_ways(
-    kind: str,
-    locus: Locus,
-    state: State,
-    watches: list[Watch],
-    options: TraceOptions | None,
+    kind: str, locus: Locus, state: State, watches: list[Watch], options: TraceOptions | None
 ) -> CriticalCurve:
     """Follow a locus from a state in both directions.
 

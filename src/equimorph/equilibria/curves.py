@@ -5,9 +5,9 @@ from dataclasses import dataclass, replace
 from typing import Protocol, runtime_checkable
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 
-from equimorph.arrays import Lanes, Parameters, Values
+from equimorph.arrays import Lanes, Numbers, Parameters, Some, Values
 from equimorph.equilibria.kernels import squared_lengths
 from equimorph.linalg import Border, BorderedSolution
 from equimorph.structures import Advance, Direction, Equations, LinearSystem, Structure
@@ -51,7 +51,7 @@ class Curve(Protocol):
     def weight(self) -> Values:
         """Length of the curve's own part of the metric: dt counts as weight·dt."""
 
-    def take(self, lanes: Int[np.ndarray, " some"]) -> "Curve":
+    def take(self, lanes: Some) -> "Curve":
         """Return some of the lanes."""
 
     def parameters(self, t: Values) -> Parameters:
@@ -126,7 +126,7 @@ class ParameterLine(PlainCurve):
         """Scaled length of the line."""
         return np.asarray(np.linalg.norm(self.velocity / self.structure.scales, axis=1))
 
-    def take(self, lanes: Int[np.ndarray, " some"]) -> "ParameterLine":
+    def take(self, lanes: Some) -> "ParameterLine":
         """Return some of the lanes."""
         start, velocity = (np.take(each, lanes, axis=0) for each in (self.start, self.velocity))
         return ParameterLine(self.structure, start, velocity)
@@ -160,7 +160,7 @@ class ForceLine(PlainCurve):
     weight: Values
     """Length of the curve's own part of the metric."""
 
-    def take(self, lanes: Int[np.ndarray, " some"]) -> "ForceLine":
+    def take(self, lanes: Some) -> "ForceLine":
         """Return some of the lanes."""
         return ForceLine(self.structure, *(column[lanes] for column in self._columns))
 
@@ -274,7 +274,7 @@ class AlongCurve(Equations):
         columns = system.columns - dt * force[1][:, None]
         return LinearSystem(system.residual - force[0], columns, system.solve)
 
-    def index(self, z: Lanes, p: Parameters) -> Int[np.ndarray, " lanes"]:
+    def index(self, z: Lanes, p: Parameters) -> Numbers:
         """Negative eigenvalues of the constrained Hessian."""
         here, t = self._at(p)
         return here.structure.index(*here.states(z, t))

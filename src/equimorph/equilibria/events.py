@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from equimorph.arrays import Lanes, Values
+from equimorph.arrays import Lanes, Numbers, Some, Values
 from equimorph.columns import Columns
 from equimorph.equilibria.curves import Curve
 from equimorph.equilibria.locate import (
@@ -48,7 +48,7 @@ class Events(Columns):
         whole = cls.concatenate([nothing, *parts])
         return whole.take(np.lexsort((whole.travelled, whole.lanes)))
 
-    def near_side(self, events: Int[np.ndarray, " some"]) -> Int[np.ndarray, " some"]:
+    def near_side(self, events: Some) -> Some:
         """Index just before some events: a fold or branch point may lie between step and event."""
         before = np.maximum(events - 1, 0)
         passed = (events > 0) & (self.lanes[before] == self.lanes[events]) & self.found[before]
@@ -108,7 +108,7 @@ def _locate(
     if bit in {EventCode.ARRIVED, EventCode.RETURNED}:
         return locate_goal(here, bracket, 1.0 if bit == EventCode.ARRIVED else 0.0)
 
-    def worst(some: Int[np.ndarray, " lanes"], z: Lanes, t: Values) -> Values:
+    def worst(some: Numbers, z: Lanes, t: Values) -> Values:
         z, p = here.take(some).states(z, t)
         return worst_excess(constraints, z, p)
 

@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Int, Shaped
+from jaxtyping import Float, Shaped
 
-from equimorph.arrays import Flags, Lanes, Parameters, Values
+from equimorph.arrays import Flags, Lanes, Numbers, Parameters, Values
 from equimorph.columns import Columns
 from equimorph.equilibria.critical import criticality
 from equimorph.equilibria.curves import ParameterLine
@@ -43,11 +43,11 @@ def no_critical_states(lanes: int) -> Shaped[np.ndarray, " lanes"]:
 class _Walk(Columns):
     """Paths on their way: lane, state, what happened, the level where they are, and direction."""
 
-    lane: Int[np.ndarray, " lanes"]
+    lane: Numbers
     z: Lanes
     p: Parameters
     at: Values
-    way: Int[np.ndarray, " lanes"]
+    way: Numbers
     high: Flags
     up: Flags
 
@@ -83,7 +83,7 @@ class FirstStable:
         p: Parameters,
         at: Values,
         passed: Shaped[np.ndarray, " lanes"] | None = None,
-    ) -> tuple[Lanes, Parameters, Int[np.ndarray, " lanes"]]:
+    ) -> tuple[Lanes, Parameters, Numbers]:
         """States at loads `at` (other than the unloaded one), and numbers in `WAYS`.
 
         Critical states on the way are added to those `passed`, if these are requested.
@@ -103,7 +103,7 @@ class FirstStable:
 
     def _to_next_level(
         self, walk: _Walk, passed: Shaped[np.ndarray, " all"] | None
-    ) -> tuple[_Walk, Int[np.ndarray, " lanes"]]:
+    ) -> tuple[_Walk, Numbers]:
         """Paths at the next level that they meet, and how they end there: `LOST` if they go on.
 
         The levels are the unloaded structure and the given load. Lost paths have no state.
@@ -134,10 +134,7 @@ class FirstStable:
 
 
 def _note(
-    passed: Shaped[np.ndarray, " all"],
-    lanes: Int[np.ndarray, " lanes"],
-    line: ParameterLine,
-    ended: Traces,
+    passed: Shaped[np.ndarray, " all"], lanes: Numbers, line: ParameterLine, ended: Traces
 ) -> None:
     """Add the critical states that paths met to those known."""
     events = ended.passed
@@ -147,7 +144,7 @@ def _note(
         passed[lane] = (*passed[lane], Passed((before, behind), events.z[k], p[k]))
 
 
-def _first_loss(line: ParameterLine, ended: Traces) -> Int[np.ndarray, " lanes"]:
+def _first_loss(line: ParameterLine, ended: Traces) -> Numbers:
     """What the first loss of stability on the way means for a real loading."""
     way = np.full(len(ended.code), STABLE)
     losses = ended.passed.take(ended.passed.index[:, 1] > 0)

@@ -6,7 +6,7 @@ from enum import IntEnum
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from equimorph.arrays import Flags, Lanes, Parameters, Some, Values
+from equimorph.arrays import Flags, Lanes, Numbers, Parameters, Some, Values
 from equimorph.columns import Columns
 from equimorph.equilibria.settle import Guards, settle
 from equimorph.equilibria.soft_modes import extent_of_guesses, metric_length
@@ -102,7 +102,7 @@ class Flow:
     lane and then by time.
     """
 
-    code: Int[np.ndarray, " lanes"]
+    code: Numbers
     z: Lanes
     lanes: Int[np.ndarray, " points"]
     time: Float[np.ndarray, " points"]
@@ -128,7 +128,7 @@ class _Front(Columns):
     velocity: Float[np.ndarray, "some unknowns"]
     time: Float[np.ndarray, " some"]
     travelled: Float[np.ndarray, " some"]
-    failed: Int[np.ndarray, " some"]
+    failed: Some
 
     @property
     def moved(self) -> Bool[np.ndarray, " some"]:
@@ -260,9 +260,7 @@ def _advance(structure: Structure, front: _Front, p: Parameters, pace: Pace) -> 
     )
 
 
-def _ends(
-    structure: Structure, front: _Front, p: Parameters, pace: Pace
-) -> tuple[Int[np.ndarray, " lanes"], Lanes]:
+def _ends(structure: Structure, front: _Front, p: Parameters, pace: Pace) -> tuple[Numbers, Lanes]:
     """How flows end here, −1 where they go on; and the points, settled ones polished."""
     n, z = structure.unknowns, front.z.copy()
     code = np.full(len(z), Ending.OPEN.value)

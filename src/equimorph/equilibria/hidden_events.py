@@ -7,9 +7,9 @@ values and slopes. Where that comes close to zero, the step is searched.
 from dataclasses import replace
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 
-from equimorph.arrays import Flags, Lanes, Parameters, Some, Values
+from equimorph.arrays import Flags, Lanes, Numbers, Parameters, Some, Values
 from equimorph.equilibria.curves import Curve, dual
 from equimorph.equilibria.events import Events, locate_all
 from equimorph.equilibria.inside_steps import AT_EVENT, CLOSE, look_inside, probe_at, step_between
@@ -20,17 +20,12 @@ from equimorph.structures import Structure
 
 AT_ONCE = 1024
 """Points, or lanes, that are evaluated together: they stay in the cache."""
-Counts = Int[np.ndarray, " lanes"]
+Counts = Numbers
 
 REGULAR_ENDS = (EventCode.ARRIVED, EventCode.RETURNED, EventCode.CONSTRAINT)
 
 
-def with_hidden_events(
-    curve: Curve,
-    z: Lanes,
-    outcome: Traces,
-    options: TraceOptions,
-) -> Traces:
+def with_hidden_events(curve: Curve, z: Lanes, outcome: Traces, options: TraceOptions) -> Traces:
     """Traces of recorded lanes, started at z, completed by what their steps did not show.
 
     The first hidden event that stops a lane becomes its end. See `hidden_events`.
@@ -210,9 +205,7 @@ def with_multiple_points(
     return replace(outcome, code=code, why=why)
 
 
-def _several(
-    curve: Curve, start: Lanes, outcome: Traces, ended: Int[np.ndarray, " some"]
-) -> list[int]:
+def _several(curve: Curve, start: Lanes, outcome: Traces, ended: Some) -> list[int]:
     """How many eigenvalues vanish where some lanes ended."""
     here, structure = curve.take(ended), curve.structure
     begun = here.states(start[ended], np.zeros(len(ended)))

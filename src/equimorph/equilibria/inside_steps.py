@@ -115,10 +115,7 @@ def _may_vanish(values: Float[np.ndarray, "3 steps"]) -> Bool[np.ndarray, " step
 
 
 def look_inside(
-    curve: Curve,
-    ends: tuple[Probe, Probe],
-    first: float | None,
-    options: TraceOptions,
+    curve: Curve, ends: tuple[Probe, Probe], first: float | None, options: TraceOptions
 ) -> list[Events]:
     """What an eigenvalue does between two points where it seems to come close to zero.
 
@@ -206,10 +203,7 @@ def _least(curve: Curve, low: Probe, high: Probe) -> tuple[float, float, float]:
 
 
 def _at_the_least(
-    curve: Curve,
-    near: tuple[Probe, Probe],
-    ends: tuple[Probe, Probe],
-    options: TraceOptions,
+    curve: Curve, near: tuple[Probe, Probe], ends: tuple[Probe, Probe], options: TraceOptions
 ) -> list[Events]:
     """Decide on a narrow piece: nothing, one event that touches, or two."""
     low, high = near

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from typing import Annotated, Any
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 
-from equimorph.arrays import Flags, Lanes, Parameters
+from equimorph.arrays import Flags, Lanes, Parameters, Some
 from equimorph.equilibria.curves import Curve, ParameterLine
 from equimorph.equilibria.prescribed_curves import (
     Pieces,
@@ -50,9 +50,7 @@ def legs_of(to: Leg | Sequence[Leg]) -> list[Leg]:
 
 
 def way_points(
-    structure: Structure,
-    start: Float[np.ndarray, " parameters"],
-    to: Waypoint | Sequence[Waypoint],
+    structure: Structure, start: Float[np.ndarray, " parameters"], to: Waypoint | Sequence[Waypoint]
 ) -> list[Float[np.ndarray, " parameters"]]:
     """Corners of a polyline: each way-point changes some parameters and keeps the rest.
 
@@ -98,7 +96,7 @@ def _numbers(name: str, value: Value, lanes: int) -> Float[np.ndarray, "*values"
     return numbers
 
 
-def of_some(leg: Leg, lanes: Int[np.ndarray, " some"], total: int) -> Leg:
+def of_some(leg: Leg, lanes: Some, total: int) -> Leg:
     """Leg of selected lanes; a leg of all lanes may have a value for each."""
     if isinstance(leg, Spline):
         wide = {name: values for name, values in leg.samples.items() if values.ndim > 1}
@@ -109,7 +107,7 @@ def of_some(leg: Leg, lanes: Int[np.ndarray, " some"], total: int) -> Leg:
     return _of_some(leg, lanes, total)
 
 
-def _of_some(values: Waypoint, lanes: Int[np.ndarray, " some"], total: int) -> Waypoint:
+def _of_some(values: Waypoint, lanes: Some, total: int) -> Waypoint:
     if not isinstance(values, Mapping):
         return values
     wide = {key: v for key, v in values.items() if isinstance(v, np.ndarray) and v.ndim > 0}

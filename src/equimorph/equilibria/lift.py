@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float, Int, Shaped
 
 from equimorph.argument_checks import check_arguments
-from equimorph.arrays import Flags, Lanes, Parameters, Some, Values
+from equimorph.arrays import Flags, Lanes, Numbers, Parameters, Some, Values
 from equimorph.columns import Columns
 from equimorph.equilibria.critical import criticality
 from equimorph.equilibria.curves import Curve
@@ -98,7 +98,7 @@ class Lifts:
     kind: Words
     at: Values
     length: Values
-    index: Int[np.ndarray, " lanes"]
+    index: Numbers
     criticality: Words
     detail: dict[int, str]
     events: Marks
@@ -177,7 +177,7 @@ class _Ledger:
 
     begun: States
     within: tuple[Constraint, ...]
-    code: Int[np.ndarray, " lanes"] = field(init=False)
+    code: Numbers = field(init=False)
 
     def __post_init__(self) -> None:
         lanes = len(self.begun)
@@ -255,7 +255,7 @@ class _Ledger:
         return Marks(whole.lane, states, whole.at, kind, whole.index, whole.words)
 
 
-def _kinds(code: Int[np.ndarray, " some"]) -> Shaped[np.ndarray, " some"]:
+def _kinds(code: Some) -> Shaped[np.ndarray, " some"]:
     known, which = np.unique(code, return_inverse=True)
     names = np.array([EventCode(each).kind for each in known], WORD)
     return np.asarray(names[which])

@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float, Int
 
-from equimorph.arrays import Flags, Lanes, Parameters, Values
+from equimorph.arrays import Flags, Lanes, Numbers, Parameters, Values
 from equimorph.columns import Columns
 from equimorph.equilibria.critical import Critical, Test, null_border
 from equimorph.equilibria.newton_step import Planes, Tangents
@@ -105,7 +105,7 @@ class Spots(Columns):
     x: Points
     basis: Bases
     b: Lanes
-    index: Int[np.ndarray, " lanes"]
+    index: Numbers
 
     @property
     def tangent(self) -> Points:
@@ -193,7 +193,7 @@ def _vanishing(tests: tuple[Test, ...], lanes: int) -> Vanishing:
 
 def _settle(
     locus: Locus, x: Points, conditions: tuple[Condition, ...], guards: Guards,
-    frame: Tangents | Planes,
+    frame: Tangents | Planes
 ) -> Settled:  # fmt: skip
     z, p = locus.split(x)
     directions = locus.directions.repeat(len(x), axis=0)
@@ -230,7 +230,7 @@ def _spots(
     return Spots(x, basis, border, index), regular
 
 
-def _border_and_index(locus: Locus, x: Points, b: Lanes) -> tuple[Lanes, Int[np.ndarray, " lanes"]]:
+def _border_and_index(locus: Locus, x: Points, b: Lanes) -> tuple[Lanes, Numbers]:
     """Null vectors of F_z as borders, and the index, both from one call."""
     lanes, size = len(x), locus.structure.size
     (z, p), rhs = locus.split(np.concatenate([x, x])), np.zeros((2 * lanes, 1, size + 1))

@@ -4,10 +4,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 from scipy.optimize import brentq
 
-from equimorph.arrays import Values
+from equimorph.arrays import Numbers, Values
 from equimorph.columns import Columns
 from equimorph.equilibria.critical import Test
 from equimorph.equilibria.locus import Locus, Points, Spots, advance, onto_set, test_slopes
@@ -68,7 +68,7 @@ class Walks(Columns):
     last_tangent: Points
 
     @property
-    def index(self) -> Int[np.ndarray, " lanes"]:
+    def index(self) -> Numbers:
         """Negative eigenvalues in addition to those that vanish."""
         return self.spots.index
 

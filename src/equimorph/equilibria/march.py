@@ -6,9 +6,9 @@ See docs/decisions.md, "Lanes march in compiled kernels".
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 
-from equimorph.arrays import Flags, Lanes, Some, Values
+from equimorph.arrays import Flags, Lanes, Numbers, Some, Values
 from equimorph.equilibria import kernels
 from equimorph.equilibria import step_kernels as stepping
 from equimorph.equilibria.curves import Curve, squared_length
@@ -41,7 +41,7 @@ from equimorph.model import Constraint
 from equimorph.structures import Advance
 from equimorph.tolerances import METRIC_DIFFERENCE
 
-Names = Int[np.ndarray, " lanes"]
+Names = Numbers
 Span = tuple[tuple[Front, Front], tuple[float, ...]]
 """Ends of a step and their lengths on the way; see `inside_step`."""
 
@@ -378,12 +378,7 @@ def _apart(lanes: int) -> int:
 
 
 def _slope(
-    curve: Curve,
-    constraint: Constraint,
-    z: Lanes,
-    t: Values,
-    tangent_z: Lanes,
-    tangent_t: Values,
+    curve: Curve, constraint: Constraint, z: Lanes, t: Values, tangent_z: Lanes, tangent_t: Values
 ) -> Values:
     """Change of a constraint's excess per length along curves."""
     h = METRIC_DIFFERENCE

@@ -15,7 +15,7 @@ from jaxtyping import Float, Int
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components, csgraph_from_dense, dijkstra
 
-from equimorph.arrays import Lanes
+from equimorph.arrays import Items, Lanes
 from equimorph.equilibria.descents import descend
 from equimorph.equilibria.gradient_flow import Ending
 from equimorph.equilibria.random_search import PUSHED, Ground, Groups
@@ -161,7 +161,7 @@ class MinimaGraph:
         return [(int(minima[i]), int(minima[j])) for i, j in sorted(chosen)][: min(left, AT_ONCE)]
 
 
-def _shortest(gaps: Float[np.ndarray, "n n"], before: Int[np.ndarray, " n"], end: int) -> Pair:
+def _shortest(gaps: Float[np.ndarray, "n n"], before: Items, end: int) -> Pair:
     """Shortest gap on the chain that Dijkstra found to a minimum."""
     chain = [end]
     while before[chain[-1]] >= 0:

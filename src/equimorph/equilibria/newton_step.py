@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from equimorph.arrays import Flags, Lanes, Parameters, Values
+from equimorph.arrays import Flags, Lanes, Numbers, Parameters, Values
 from equimorph.columns import Columns
 from equimorph.equilibria.critical import Critical, null_border
 from equimorph.equilibria.newton_kernels import (
@@ -22,8 +22,6 @@ DOUBTFUL = 1e-4
 RANK = 1e-12
 """Smallest singular value of slopes, relative to the largest one, that counts as zero; their
 determinant is `DEPENDENT` then."""
-
-Numbers = Int[np.ndarray, " lanes"]
 
 
 @dataclass(frozen=True)

@@ -160,7 +160,7 @@ class _Segment:
 
 def _segment(
     curve: Curve, outcome: Traces, number: int, within: tuple[Constraint, ...], lane: int = 0,
-    aside: Sequence[tuple[float, Event]] = (),
+    aside: Sequence[tuple[float, Event]] = ()
 ) -> _Segment:  # fmt: skip
     """One lane of an outcome, as leg number so much of a path.
 

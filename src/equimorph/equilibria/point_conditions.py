@@ -11,16 +11,15 @@ from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 
-from equimorph.arrays import Lanes, Parameters, Scalars
+from equimorph.arrays import Lanes, Parameters, Scalars, Some
 from equimorph.columns import Columns
 from equimorph.equilibria.critical import Critical, Test
 from equimorph.model.descriptor import Evaluate
 from equimorph.structures.equations import Direction
 
 Directions = Float[np.ndarray, "lanes k parameters"]
-Some = Int[np.ndarray, " some"]
 
 VALUE_DIFFERENCE, TEST_DIFFERENCE = 1e-5, 1e-5
 """Steps of differences, in the metric: they set the rate of convergence, not the error."""

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float, Int
 from numpy.polynomial import chebyshev
 
-from equimorph.arrays import Lanes, Parameters, Values
+from equimorph.arrays import Lanes, Numbers, Parameters, Some, Values
 from equimorph.equilibria.critical import Critical
 from equimorph.equilibria.curves import PlainCurve
 from equimorph.equilibria.point_conditions import Linear, Move
@@ -50,9 +50,9 @@ class Pieces:
 
     breaks: Float[np.ndarray, " ends"]
     tables: tuple[Table, Table, Table]
-    which: Int[np.ndarray, " lanes"]
+    which: Numbers
 
-    def take(self, lanes: Int[np.ndarray, " some"]) -> "Pieces":
+    def take(self, lanes: Some) -> "Pieces":
         """Return a selection of the lanes."""
         return Pieces(self.breaks, self.tables, self.which[lanes])
 
@@ -152,7 +152,7 @@ class SmoothCurve(PlainCurve):
     pieces: Pieces
     weight: Values
 
-    def take(self, lanes: Int[np.ndarray, " some"]) -> "SmoothCurve":
+    def take(self, lanes: Some) -> "SmoothCurve":
         """Return a selection of the lanes."""
         return SmoothCurve(self.structure, self.pieces.take(lanes), self.weight[lanes])
 
@@ -216,7 +216,7 @@ class TrackedCurve:
         """Whether the index changes where dt/ds vanishes, and only there."""
         return False
 
-    def take(self, lanes: Int[np.ndarray, " some"]) -> "TrackedCurve":
+    def take(self, lanes: Some) -> "TrackedCurve":
         """Return a selection of the lanes."""
         given, weight = self.prescribed.take(lanes), self.weight[lanes]
         return TrackedCurve(self.structure, given, self.free, self.descriptors, weight)

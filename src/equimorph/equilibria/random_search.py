@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from equimorph.arrays import Lanes, Parameters, Values
+from equimorph.arrays import Lanes, Numbers, Parameters, Values
 from equimorph.equilibria.curves import ParameterLine, growing_force, newton_homotopy
 from equimorph.equilibria.saddles import Pairs, strongest_pushes
 from equimorph.equilibria.settle import Guards, settle
@@ -15,7 +15,7 @@ from equimorph.model import Constraint, worst_relative_excess
 from equimorph.structures import Structure
 from equimorph.tolerances import SAME_STATE
 
-Groups = Int[np.ndarray, " lanes"]
+Groups = Numbers
 
 UNRESOLVED = "not resolved by the discretisation"
 """Why a start led to no equilibrium, among the reasons in `failures`."""
@@ -162,7 +162,7 @@ class Pools:
         self.failures.append(("the Newton homotopy did not arrive", group[~arrived]))
         self._polish(outcome.z[arrived], group[arrived])
 
-    def _by_deflation(self, lanes: Int[np.ndarray, " lanes"], share: float) -> None:
+    def _by_deflation(self, lanes: Numbers, share: float) -> None:
         """From points on the way to random guesses."""
         if len(lanes) == 0:
             return
@@ -184,7 +184,7 @@ class Pools:
             known[mine, : len(mine)] = self.z[mine, :n]
         return known
 
-    def lay_lines(self, lanes: Int[np.ndarray, " lanes"]) -> None:
+    def lay_lines(self, lanes: Numbers) -> None:
         """Follow a random line in actuators and loads both ways through each of these states."""
         group = np.tile(self.group[lanes], 2)
         direction = self._directions(len(lanes))

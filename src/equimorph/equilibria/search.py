@@ -256,10 +256,7 @@ def search_points(
 
 
 def _complete_by_arguments(
-    structure: Structure,
-    points: Points,
-    catches: list["_Catch"],
-    generator: np.random.Generator,
+    structure: Structure, points: Points, catches: list["_Catch"], generator: np.random.Generator
 ) -> list[FoundStates]:
     """What was found, with what the arguments add that no stable state is missing."""
     if not catches:

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float, Int
 
-from equimorph.arrays import Flags, Lanes, Values
+from equimorph.arrays import Flags, Lanes, Numbers, Some, Values
 from equimorph.columns import Columns
 from equimorph.equilibria import event_kernels, kernels
 from equimorph.equilibria.curves import AlongCurve, Curve, along_parameters, dual, squared_length
@@ -21,7 +21,7 @@ class Front(Columns):
     t: Values
     tangent_z: Lanes
     tangent_t: Values
-    index: Int[np.ndarray, " lanes"]
+    index: Numbers
 
 
 @dataclass(frozen=True)
@@ -31,12 +31,12 @@ class Bracket(Columns):
     what: bits of `EventCode`.
     """
 
-    lanes: Int[np.ndarray, " some"]
+    lanes: Some
     before: Front
     after: Front
     step: Float[np.ndarray, " some"]
     travelled: Float[np.ndarray, " some"]
-    what: Int[np.ndarray, " some"]
+    what: Some
 
 
 def initial_front(curve: Curve, z: Lanes, t: Values) -> Front:

@@ -10,9 +10,9 @@ from concurrent.futures import wait
 from dataclasses import dataclass, field
 
 import numpy as np
-from jaxtyping import Bool, Int
+from jaxtyping import Bool
 
-from equimorph.arrays import Lanes, Some, Values
+from equimorph.arrays import Lanes, Numbers, Some, Values
 from equimorph.equilibria.curves import Curve
 from equimorph.equilibria.events import Events, locate_all
 from equimorph.equilibria.inside_steps import inside_only_steps
@@ -23,7 +23,7 @@ from equimorph.errors import CancelledError
 from equimorph.linalg.lanes import in_background, threads
 from equimorph.model import Constraint, Progress, Silent
 
-Names = Int[np.ndarray, " lanes"]
+Names = Numbers
 
 LANES_PER_THREAD = 128
 """A second thread is not worth its start for fewer lanes than this on each."""

@@ -173,7 +173,7 @@ def _lost(here: Walks, lane: int, why: str) -> Landmark:
 
 def _record(
     locus: Locus, side: Side, ends: tuple[Walks, Walks], watches: Sequence[Watch],
-    options: TraceOptions,
+    options: TraceOptions
 ) -> bool:  # fmt: skip
     """Note a good step of one lane, what lies inside, and how the curve ends there, if it does.
 

@@ -218,10 +218,7 @@ SAMPLES = 9
 
 @check_arguments
 def held_over(
-    structure: Structure,
-    name: str,
-    ends: tuple[float, float],
-    within: Sequence[Constraint] = (),
+    structure: Structure, name: str, ends: tuple[float, float], within: Sequence[Constraint] = ()
 ) -> Constraint:
     """Constraint that a state stays stable, and obeys others, for all values of a load in a range.
 

@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float, Int
 
-from equimorph.arrays import Flags, Values
+from equimorph.arrays import Flags, Numbers, Values
 from equimorph.errors import InputError
 from equimorph.linalg.bordered_kernels import solve_condensed
 from equimorph.linalg.dense import BorderedSolution, solve_bordered
@@ -138,7 +138,7 @@ class CondensedLayout:
         self, *arrays: np.ndarray
     ) -> tuple[
         Float[np.ndarray, "lanes sides bordered"],
-        Int[np.ndarray, " lanes"],
+        Numbers,
         Values,
     ]:
         """Solutions, negative eigenvalues and pivot ratios by the condensed elimination."""

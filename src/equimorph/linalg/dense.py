@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 
-from equimorph.arrays import Flags, Lanes, Values
+from equimorph.arrays import Flags, Lanes, Numbers, Values
 from equimorph.linalg.kernels import count_negative, multiply_lanes, orthonormal_lanes
 
 Border = tuple[
@@ -33,7 +33,7 @@ class BorderedSolution:
     """
 
     x: Float[np.ndarray, "lanes sides bordered"]
-    negative: Int[np.ndarray, " lanes"]
+    negative: Numbers
     pivot_ratio: Values
     pivoted: Flags
     determinant: Values
@@ -63,7 +63,7 @@ def orthonormal_rows(
     return out
 
 
-def negative_eigenvalues(matrix: Float[np.ndarray, "lanes n n"]) -> Int[np.ndarray, " lanes"]:
+def negative_eigenvalues(matrix: Float[np.ndarray, "lanes n n"]) -> Numbers:
     """Count the negative eigenvalues of symmetric matrices.
 
     LDLᵀ with complete pivoting [BunchParlett1971]_ and Sylvester's law of inertia. A matrix with

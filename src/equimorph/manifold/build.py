@@ -7,10 +7,10 @@ from functools import partial
 from itertools import product
 
 import numpy as np
-from jaxtyping import Float, Int
 
 from equimorph.argument_checks import check_arguments
 from equimorph.argument_kinds import short
+from equimorph.arrays import Items, Place
 from equimorph.equilibria.legs import check_isolated
 from equimorph.errors import InputError
 from equimorph.manifold.complex.description import Frame, wrong_cells
@@ -247,7 +247,7 @@ def _cell_size(box: Box, intervals: tuple[int, ...]) -> tuple[tuple[str, float],
     return _named(box, (box.upper - box.lower) / np.array(intervals))
 
 
-def _named(box: Box, values: Float[np.ndarray, " d"]) -> tuple[tuple[str, float], ...]:
+def _named(box: Box, values: Place) -> tuple[tuple[str, float], ...]:
     """Values of the free parameters with their names."""
     return tuple(zip(box.names, values.tolist(), strict=True))
 
@@ -285,10 +285,7 @@ def _limit(intervals: tuple[int, ...], limit: int | None) -> int:
 
 
 def _setting(
-    structure: Structure,
-    box: Box,
-    fixed: Mapping[str, float],
-    within: tuple[Constraint, ...],
+    structure: Structure, box: Box, fixed: Mapping[str, float], within: tuple[Constraint, ...]
 ) -> Setting:
     both = set(box.names) & set(fixed)
     if both:
@@ -368,7 +365,7 @@ def _spread(pairing: Pairing, lines: Lines, seed: int, progress: Progress) -> Se
     return number[vertex[found]], store.z[found], store.p[found], store.index[found]
 
 
-def _longest_edges(pairing: Pairing, cells: Cells) -> Int[np.ndarray, " n"]:
+def _longest_edges(pairing: Pairing, cells: Cells) -> Items:
     """Longest edge of each doubtful grid cell, relative to the box."""
     mesh = pairing.mesh
     around = mesh.faces[cells.doubtful_tetrahedra]

@@ -11,6 +11,7 @@ from equimorph.argument_checks import check_arguments
 from equimorph.argument_kinds import is_number
 from equimorph.argument_notes import BOUNDS, DIVIDED
 from equimorph.argument_vocabulary import FINITE, PERIOD, POSITIVE
+from equimorph.arrays import Place
 from equimorph.errors import InputError, suggestion
 
 Role = Literal["actuator", "load", "fixed"]
@@ -106,8 +107,8 @@ class Box:
             raise InputError("`Box` must name at least one parameter; got none.")
         pairs = [tuple(map(float, value)) for value in bounds.values()]
         self.names: tuple[str, ...] = tuple(bounds)
-        self.lower: Float[np.ndarray, " d"] = np.array([pair[0] for pair in pairs])
-        self.upper: Float[np.ndarray, " d"] = np.array([pair[1] for pair in pairs])
+        self.lower: Place = np.array([pair[0] for pair in pairs])
+        self.upper: Place = np.array([pair[1] for pair in pairs])
 
     def __repr__(self) -> str:
         """Return the call that makes this box."""

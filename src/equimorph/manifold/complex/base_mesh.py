@@ -3,8 +3,9 @@
 from dataclasses import dataclass, field
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 
+from equimorph.arrays import Cells, EdgeFlags, ItemFlags, Place, Places
 from equimorph.manifold.geometry.simplices import barycentric
 from equimorph.manifold.geometry.topology import keys_of, rows_of
 from equimorph.tolerances import IN_BOX
@@ -37,24 +38,24 @@ class BaseMesh:
         return int(self.vertices.shape[1])
 
     @property
-    def cells(self) -> Int[np.ndarray, "C corners"]:
+    def cells(self) -> Cells:
         """Simplices that fill the box: edges, triangles or tetrahedra."""
         return (self.edges, self.triangles, self.tetrahedra)[self.dimension - 1]
 
     @property
-    def edges_in_use(self) -> Bool[np.ndarray, " E"]:
+    def edges_in_use(self) -> EdgeFlags:
         """Which edges have not been bisected."""
         used = np.full(len(self.edges), self.dimension == 1)
         used[self.sides] = True
         return used
 
-    def covers(self, points: Float[np.ndarray, "n d"]) -> Bool[np.ndarray, " n"]:
+    def covers(self, points: Places) -> ItemFlags:
         """Which points lie in the box, up to round-off."""
         low, high = self.vertices.min(axis=0), self.vertices.max(axis=0)
         slack = IN_BOX * (high - low)
         return np.asarray(((points >= low - slack) & (points <= high + slack)).all(axis=1))
 
-    def locate(self, point: Float[np.ndarray, " d"]) -> int:
+    def locate(self, point: Place) -> int:
         """Cell that contains a point; the nearest one by barycentric coordinates."""
         corners = self.vertices[self.cells]
         low, high = corners[:, 0], corners[:, 0]
@@ -66,7 +67,7 @@ class BaseMesh:
         return int(near[np.argmax(barycentric(corners[near], point).min(axis=1))])
 
 
-def mesh_of(vertices: Float[np.ndarray, "V d"], cells: Int[np.ndarray, "C corners"]) -> BaseMesh:
+def mesh_of(vertices: Float[np.ndarray, "V d"], cells: Cells) -> BaseMesh:
     """Mesh with its edges and triangles numbered."""
     if cells.shape[1] == 2:
         return BaseMesh(vertices, np.sort(cells, axis=1))

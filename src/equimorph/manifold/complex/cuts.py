@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from equimorph.arrays import EdgeFlags, ItemFlags, Items, ItemValues, Pairs, Some, VertexFlags
 from equimorph.manifold.complex.edge_points import Places, on_edges
 from equimorph.manifold.complex.marked_complex import Fabric, edges_of
 from equimorph.manifold.complex.shared_edges import first_copies, with_copies
@@ -23,10 +24,10 @@ STILL = 1e-11
 
 Values = Float[np.ndarray, " V"]
 Function = Callable[[Vertices], Values]
-Ends = Int[np.ndarray, "n 2"]
+Ends = Pairs
 Between = Callable[
-    [Fabric, Ends, int, Int[np.ndarray, " n"], Float[np.ndarray, "n 2"]],
-    tuple[Bool[np.ndarray, " n"], Vertices],
+    [Fabric, Ends, int, Items, Float[np.ndarray, "n 2"]],
+    tuple[ItemFlags, Vertices],
 ]
 
 
@@ -39,7 +40,7 @@ class Cut:
     lost: int
 
     @property
-    def on_level(self) -> Bool[np.ndarray, " V"]:
+    def on_level(self) -> VertexFlags:
         """Vertices on the level."""
         return np.asarray(self.values == 0.0)
 
@@ -95,8 +96,8 @@ def cut_between(
 class _Found:
     """Examined edges, by their keys, and their vertices; row −1: no vertex."""
 
-    asked: Int[np.ndarray, " n"]
-    row: Int[np.ndarray, " n"]
+    asked: Items
+    row: Items
     vertices: Vertices
 
     @classmethod
@@ -114,15 +115,13 @@ class _Found:
         asked = np.concatenate([self.asked, keys])
         return _Found(asked, np.concatenate([self.row, row]), self.vertices.join(more))
 
-    def of(self, keys: Int[np.ndarray, " some"]) -> Vertices:
+    def of(self, keys: Some) -> Vertices:
         """Vertices on edges that have some."""
         order = np.argsort(self.asked)
         return self.vertices.take(self.row[order[np.searchsorted(self.asked[order], keys)]])
 
 
-def _one_per_cell(
-    crossed: Bool[np.ndarray, " E"], of_cells: Int[np.ndarray, "C sides"]
-) -> Int[np.ndarray, " n"]:
+def _one_per_cell(crossed: EdgeFlags, of_cells: Int[np.ndarray, "C sides"]) -> Items:
     """Crossed edges, no two of one cell; as many as agree on an order that looks random."""
     rank = np.where(crossed, (np.arange(len(crossed)) * 2654435761) % 4294967296 + 1, 0)
     best = rank[of_cells].max(axis=1)
@@ -134,12 +133,12 @@ def _one_per_cell(
 
 def roots(
     fabric: Fabric,
-    ends: Int[np.ndarray, "n 2"],
+    ends: Pairs,
     mark: int,
-    index: Int[np.ndarray, " n"],
+    index: Items,
     known: Float[np.ndarray, "n 2"],
-    value_of: Callable[[Vertices, Int[np.ndarray, " some"]], Float[np.ndarray, " some"]],
-) -> tuple[Bool[np.ndarray, " n"], Vertices]:
+    value_of: Callable[[Vertices, Some], Float[np.ndarray, " some"]],
+) -> tuple[ItemFlags, Vertices]:
     """Vertices where a function vanishes on edges, by regula falsi (Illinois).
 
     Parameters
@@ -190,12 +189,12 @@ def roots(
 
 def _somewhere(
     fabric: Fabric,
-    ends: Int[np.ndarray, "n 2"],
+    ends: Pairs,
     mark: int,
-    index: Int[np.ndarray, " n"],
-    bounds: tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"]],
-    t: Float[np.ndarray, " n"],
-) -> tuple[Bool[np.ndarray, " n"], Vertices, Float[np.ndarray, " n"]]:
+    index: Items,
+    bounds: tuple[ItemValues, ItemValues],
+    t: ItemValues,
+) -> tuple[ItemFlags, Vertices, ItemValues]:
     """Vertices on edges at the places that are proposed, or elsewhere between the bounds."""
     (low, high), t = bounds, t.copy()
     target = Places(ends, mark, index, t)

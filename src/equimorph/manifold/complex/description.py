@@ -6,6 +6,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from equimorph.arrays import CellFlags, CellNumbers, Cells, Facets, VertexFlags, VertexNumbers
 from equimorph.manifold.complex.audit import Audit
 from equimorph.manifold.complex.base_mesh import BaseMesh
 from equimorph.manifold.complex.equilibrium_set import (
@@ -46,11 +47,11 @@ class Complex:
     """
 
     points: States
-    kinds: Int[np.ndarray, " V"]
-    index: Int[np.ndarray, " V"]
-    grid_vertex: Int[np.ndarray, " V"]
-    cells: Int[np.ndarray, "C corners"]
-    cell_index: Int[np.ndarray, " C"]
+    kinds: VertexNumbers
+    index: VertexNumbers
+    grid_vertex: VertexNumbers
+    cells: Cells
+    cell_index: CellNumbers
     folds: Int[np.ndarray, "f d"]
     caps: Int[np.ndarray, "c d"]
     crossings: Int[np.ndarray, "x d"]
@@ -170,15 +171,15 @@ def _boundaries(
     return tuple(out)
 
 
-def _facets_of(piece: Int[np.ndarray, "..."], d: int) -> Int[np.ndarray, "n d"]:
+def _facets_of(piece: Int[np.ndarray, "..."], d: int) -> Facets:
     """Facets of a piece of the boundary: a point, a polyline or triangles."""
     return np.stack([piece[:-1], piece[1:]], axis=1) if d == 2 else piece.reshape(-1, d)
 
 
 def _components(
-    corners: Int[np.ndarray, "C corners"],
-    cell_index: Int[np.ndarray, " C"],
-    component: Int[np.ndarray, " C"],
+    corners: Cells,
+    cell_index: CellNumbers,
+    component: CellNumbers,
     whole: Adjacency,
     boundaries: tuple[Boundary, ...],
 ) -> tuple[Component, ...]:
@@ -200,7 +201,7 @@ def _components(
     return tuple(out)
 
 
-def _edges_of(whole: Adjacency, component: Int[np.ndarray, " C"]) -> list[int | None]:
+def _edges_of(whole: Adjacency, component: CellNumbers) -> list[int | None]:
     """Number of edges of each component, where it is known: where edges are facets."""
     many = component.max(initial=-1) + 1
     if whole.facets.shape[1] != PAIR:
@@ -215,7 +216,7 @@ def _audit(
     lifting: Lifting,
     crossed: Bool[np.ndarray, " F"],
     whole: Adjacency,
-    component: Int[np.ndarray, " C"],
+    component: CellNumbers,
     boundaries: tuple[Boundary, ...],
     setting: Setting,
 ) -> Audit:
@@ -256,7 +257,7 @@ def _audit(
     )
 
 
-def wrong_cells(eset: EquilibriumSet) -> Bool[np.ndarray, " C"]:
+def wrong_cells(eset: EquilibriumSet) -> CellFlags:
     """Return which cells of a set without crossings `Audit.wrong` counts."""
     coordinates, scales = eset.coordinates, eset.setting.scales
     sense = senses(eset.cells, eset.cell_index, coordinates, adjacency(eset.cells), eset.component)
@@ -272,11 +273,8 @@ VANISHING = 1e-4
 
 
 def contradictions(
-    points: States,
-    kinds: Int[np.ndarray, " V"],
-    cells: Int[np.ndarray, "C corners"],
-    cell_index: Int[np.ndarray, " C"],
-) -> Bool[np.ndarray, " C"]:
+    points: States, kinds: VertexNumbers, cells: Cells, cell_index: CellNumbers
+) -> CellFlags:
     """Cells with a vertex whose inertia is not that of their index.
 
     At folds, and where sheets cross, the eigenvalues that vanish may count or not.
@@ -294,11 +292,8 @@ def contradictions(
 
 
 def overturned_off_folds(
-    kinds: Int[np.ndarray, " V"],
-    cells: Int[np.ndarray, "C corners"],
-    overturned: Bool[np.ndarray, " C"],
-    place: Float[np.ndarray, "V d"],
-) -> Bool[np.ndarray, " C"]:
+    kinds: VertexNumbers, cells: Cells, overturned: CellFlags, place: Float[np.ndarray, "V d"]
+) -> CellFlags:
     """Overturned cells without a vertex on a fold that are no slivers, in scaled parameters."""
     off = np.flatnonzero(overturned & ~singular_points(kinds)[cells].any(axis=1))
     corners = place[cells[off]]
@@ -309,6 +304,6 @@ def overturned_off_folds(
     return turned
 
 
-def singular_points(kinds: Int[np.ndarray, " V"]) -> Bool[np.ndarray, " V"]:
+def singular_points(kinds: VertexNumbers) -> VertexFlags:
     """Which points lie on a fold, or where sheets cross."""
     return np.isin(kinds, (VertexKind.FOLD, VertexKind.CORNER, VertexKind.CROSSING))

@@ -5,8 +5,9 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 
+from equimorph.arrays import ItemFlags, Items, ItemValues, Pairs, Some
 from equimorph.equilibria.settle import lower_index
 from equimorph.linalg.lanes import results_of
 from equimorph.manifold.complex.marked_complex import TETRAHEDRA, Fabric, FacetMark, held_parameters
@@ -41,9 +42,7 @@ ALONG = 0.5
 """Least cosine of the angle between an edge and the set at its new vertex."""
 
 
-def chunks(
-    chosen: Int[np.ndarray, " n"], marks: Int[np.ndarray, " E"]
-) -> list[Int[np.ndarray, " k"]]:
+def chunks(chosen: Items, marks: Int[np.ndarray, " E"]) -> list[Int[np.ndarray, " k"]]:
     """Edges in chunks of equal marks; those on curves first, because they take longest."""
     parts: list[Int[np.ndarray, " k"]] = []
     for mark in np.unique(marks[chosen])[::-1].tolist():
@@ -52,7 +51,7 @@ def chunks(
     return parts
 
 
-Tried = tuple[Bool[np.ndarray, " n"], Vertices]
+Tried = tuple[ItemFlags, Vertices]
 """For which edges vertices were found, and these."""
 
 
@@ -63,12 +62,12 @@ class Places:
     lowest: index of the cells around; of those with the lowest one, where they differ.
     """
 
-    ends: Int[np.ndarray, "n 2"]
+    ends: Pairs
     mark: int
-    lowest: Int[np.ndarray, " n"]
-    t: Float[np.ndarray, " n"]
+    lowest: Items
+    t: ItemValues
 
-    def take(self, some: Int[np.ndarray, " some"]) -> "Places":
+    def take(self, some: Some) -> "Places":
         """Return some of the edges."""
         return Places(self.ends[some], self.mark, self.lowest[some], self.t[some])
 
@@ -133,7 +132,7 @@ class _Guess:
     place: Float[np.ndarray, "n coordinates"]
     plane: Float[np.ndarray, "n d coordinates"]
     first: Ends
-    length: Float[np.ndarray, " n"]
+    length: ItemValues
 
 
 def _guess(fabric: Fabric, target: Places) -> _Guess:
@@ -216,7 +215,7 @@ def _is_close(
     target: Places,
     at: Corrected | Pinned,
     place: Float[np.ndarray, "n coordinates"],
-) -> Bool[np.ndarray, " n"]:
+) -> ItemFlags:
     """Which points lie close to their places, between the ends of their edges and in the box."""
     first, second = (fabric.vertices.place[target.ends[:, side]] for side in range(2))
     length = np.linalg.norm(second - first, axis=1)
@@ -248,7 +247,7 @@ def on_curves(
     p: Float[np.ndarray, "n P"],
     place: Float[np.ndarray, "n coordinates"],
     plane: Float[np.ndarray, "n d coordinates"],
-    length: Float[np.ndarray, " n"],
+    length: ItemValues,
     end: Ends,
 ) -> Pinned:
     """Points on folds, constraints, crossings or sides of the box near places with planes."""
@@ -269,13 +268,7 @@ def on_curves(
     return correct_points(aim, z, p, length)
 
 
-def of_index(
-    fabric: Fabric,
-    mark: int,
-    at: Pinned,
-    found: Bool[np.ndarray, " n"],
-    lowest: Int[np.ndarray, " n"],
-) -> Bool[np.ndarray, " n"]:
+def of_index(fabric: Fabric, mark: int, at: Pinned, found: ItemFlags, lowest: Items) -> ItemFlags:
     """Which points, of those that were found, have the right index."""
     good = found.copy()
     structure = fabric.setting.structure
@@ -289,8 +282,8 @@ def vertices_at(
     fabric: Fabric,
     mark: int,
     at: Pinned,
-    found: Bool[np.ndarray, " n"],
-    index: Int[np.ndarray, " n"],
+    found: ItemFlags,
+    index: Items,
     plane: Float[np.ndarray, "n d coordinates"],
 ) -> Vertices:
     """Vertices on folds and so on where they were found."""
@@ -309,9 +302,7 @@ def vertices_at(
     return vertices_of(fabric.setting, *known, rows)
 
 
-def _along(
-    fabric: Fabric, mark: int, chords: Float[np.ndarray, "n coordinates"]
-) -> Bool[np.ndarray, " n"]:
+def _along(fabric: Fabric, mark: int, chords: Float[np.ndarray, "n coordinates"]) -> ItemFlags:
     """Whether edges lead along the set, as seen at their new vertices, which are all there are.
 
     A point on another fold nearby sees its edge at a large angle.

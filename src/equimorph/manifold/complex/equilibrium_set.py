@@ -6,9 +6,10 @@ from enum import StrEnum
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 
 from equimorph.argument_checks import check_arguments
+from equimorph.arrays import CellNumbers, Cells, Flags, Numbers, VertexNumbers
 from equimorph.errors import InputError
 from equimorph.html_tables import html_table
 from equimorph.manifold.complex.audit import Audit
@@ -98,19 +99,19 @@ class EquilibriumSet:
     constraints: tuple[Constraint, ...]
     intervals: tuple[int, ...]
     points: States
-    kinds: Int[np.ndarray, " V"]
-    index: Int[np.ndarray, " V"]
-    cells: Int[np.ndarray, "C corners"]
-    cell_index: Int[np.ndarray, " C"]
-    component: Int[np.ndarray, " C"]
-    stratum: Int[np.ndarray, " C"]
+    kinds: VertexNumbers
+    index: VertexNumbers
+    cells: Cells
+    cell_index: CellNumbers
+    component: CellNumbers
+    stratum: CellNumbers
     folds: tuple[Int[np.ndarray, "..."], ...]
     boundaries: tuple[Boundary, ...]
     components: tuple[Component, ...]
     strata: tuple[Stratum, ...]
     audit: Audit
     mesh: BaseMesh
-    grid_vertex: Int[np.ndarray, " V"]
+    grid_vertex: VertexNumbers
     """Vertex of `mesh` below each vertex of the complex, −1 for those not over the grid."""
     crossings: tuple[Int[np.ndarray, "..."], ...] = ()
 
@@ -209,9 +210,7 @@ class EquilibriumSet:
         return StatesOver(states, point, cell, index, stratum, component, len(p))
 
     @check_arguments
-    def holding(
-        self, states: States
-    ) -> tuple[Bool[np.ndarray, " lanes"], Int[np.ndarray, " lanes"]]:
+    def holding(self, states: States) -> tuple[Flags, Numbers]:
         """Which of some states the set has, and the cells that they lie on, −1 if not known.
 
         Parameters

@@ -46,12 +46,7 @@ class Effort:
     limit: int
 
 
-def question_of_set(
-    setting: Setting,
-    box: Box,
-    intervals: tuple[int, ...],
-    effort: Effort,
-) -> str:
+def question_of_set(setting: Setting, box: Box, intervals: tuple[int, ...], effort: Effort) -> str:
     """All that a set depends on.
 
     Raises

@@ -11,8 +11,18 @@ from functools import partial
 from itertools import combinations
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 
+from equimorph.arrays import (
+    CellFlags,
+    CellNumbers,
+    Cells,
+    Facets,
+    ItemFlags,
+    Items,
+    Triples,
+    VertexNumbers,
+)
 from equimorph.linalg.lanes import results_of
 from equimorph.manifold.complex.description import Complex
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
@@ -75,8 +85,8 @@ class Fabric:
     setting: Setting
     box: Float[np.ndarray, "2 d"]
     vertices: Vertices
-    cells: Int[np.ndarray, "C corners"]
-    cell_index: Int[np.ndarray, " C"]
+    cells: Cells
+    cell_index: CellNumbers
     facets: Int[np.ndarray, "F d"]
     marks: Int[np.ndarray, " F"]
     squared: Float[np.ndarray, "C sides"]
@@ -101,7 +111,7 @@ class Fabric:
         return np.where(known[at] == keys, marks[at], 0)
 
     @property
-    def vertex_marks(self) -> Int[np.ndarray, " V"]:
+    def vertex_marks(self) -> VertexNumbers:
         """All marks of the facets around each vertex."""
         out = np.zeros(len(self.vertices), int)
         for column in self.facets.T:
@@ -140,7 +150,7 @@ class Fabric:
             slopes[hub] = np.stack([-y, x], axis=1)
         return np.asarray(slopes)
 
-    def only(self, cells: Bool[np.ndarray, " C"]) -> "Fabric":
+    def only(self, cells: CellFlags) -> "Fabric":
         """Some of the cells, with all facets."""
         return replace(
             self,
@@ -149,7 +159,7 @@ class Fabric:
             squared=self.squared[cells],
         )
 
-    def looks_back(self, cells: Int[np.ndarray, "n 3"]) -> Bool[np.ndarray, " n"]:
+    def looks_back(self, cells: Triples) -> ItemFlags:
         """Which triangles look backwards, on average, in the tangent planes at their corners."""
         cells, store = np.ascontiguousarray(cells), self.vertices
         total = np.empty(len(cells))
@@ -184,7 +194,7 @@ class Fabric:
         )
 
     @property
-    def points(self) -> Int[np.ndarray, " V"]:
+    def points(self) -> VertexNumbers:
         """For each vertex the first one that is the same point."""
         shared = self.vertices.shared
         own = np.arange(len(shared))
@@ -194,7 +204,7 @@ class Fabric:
         return own
 
     @property
-    def numbers(self) -> Int[np.ndarray, " V"]:
+    def numbers(self) -> VertexNumbers:
         """Numbers of the vertices in the complex; −1 for those that it leaves out."""
         points = self.points
         used = np.zeros(len(points), bool)
@@ -280,13 +290,11 @@ def fabric_of(eset: EquilibriumSet) -> Fabric:
     return Fabric(setting, box, vertices, cells, eset.cell_index, *facets, squared)
 
 
-def _facets(piece: Int[np.ndarray, "..."], d: int) -> Int[np.ndarray, "n d"]:
+def _facets(piece: Int[np.ndarray, "..."], d: int) -> Facets:
     return np.stack([piece[:-1], piece[1:]], axis=1) if d == 2 else piece.reshape(-1, d)
 
 
-def _outer_marks(
-    setting: Setting, eset: EquilibriumSet, facets: Int[np.ndarray, "n d"]
-) -> Int[np.ndarray, " n"]:
+def _outer_marks(setting: Setting, eset: EquilibriumSet, facets: Facets) -> Items:
     """On what facets of the boundary lie: on a side of the box, else on the constraint."""
     places = eset.coordinates[facets]
     size = eset.box.upper - eset.box.lower
@@ -311,9 +319,7 @@ def _bisect(
     return cut, owner
 
 
-def edges_of(
-    cells: Int[np.ndarray, "C corners"], base: int
-) -> tuple[Int[np.ndarray, "E 2"], Int[np.ndarray, "C sides"]]:
+def edges_of(cells: Cells, base: int) -> tuple[Int[np.ndarray, "E 2"], Int[np.ndarray, "C sides"]]:
     """All edges, sorted, and the numbers of those of each cell (pairs 01, 02, 12 and so on)."""
     pairs = np.array(list(combinations(range(cells.shape[1]), 2)))
     ends, of_cells = (

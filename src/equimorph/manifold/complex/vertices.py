@@ -4,8 +4,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float
 
+from equimorph.arrays import ItemFlags, VertexNumbers
 from equimorph.columns import Columns
 from equimorph.manifold.geometry.crossings import crossing_frames
 from equimorph.manifold.geometry.exact_points import Corrected
@@ -38,9 +39,9 @@ class Vertices(Columns):
 
     z: Float[np.ndarray, "V size"]
     p: Float[np.ndarray, "V P"]
-    kinds: Int[np.ndarray, " V"]
-    index: Int[np.ndarray, " V"]
-    grid_vertex: Int[np.ndarray, " V"]
+    kinds: VertexNumbers
+    index: VertexNumbers
+    grid_vertex: VertexNumbers
     place: Float[np.ndarray, "V coordinates"]
     frame: Float[np.ndarray, "V d full"]
     rows: Float[np.ndarray, "V d coordinates"]
@@ -48,7 +49,7 @@ class Vertices(Columns):
     """Slope, along the frame, of the fold test; zero off folds. The next columns are alike."""
     cap_slope: Float[np.ndarray, "V d"]
     crossing_slope: Float[np.ndarray, "V d"]
-    shared: Int[np.ndarray, " V"]
+    shared: VertexNumbers
     """Number that vertices have in common which are the same point of several sheets; else −1."""
     room: _Room | None = field(default=None, repr=False, compare=False, kw_only=True)
 
@@ -89,7 +90,7 @@ class Vertices(Columns):
         return _Room(arrays, len(self))
 
 
-def gather(parts: Sequence[Vertices], place: Int[np.ndarray, " V"]) -> Vertices:
+def gather(parts: Sequence[Vertices], place: VertexNumbers) -> Vertices:
     """Vertices of several parts, part by part, each in its place."""
     first, cuts = parts[0], np.cumsum([len(part) for part in parts])[:-1]
     columns = {}
@@ -104,9 +105,9 @@ def vertices_of(
     setting: Setting,
     z: Float[np.ndarray, "V size"],
     p: Float[np.ndarray, "V P"],
-    kinds: Int[np.ndarray, " V"],
-    index: Int[np.ndarray, " V"],
-    grid_vertex: Int[np.ndarray, " V"],
+    kinds: VertexNumbers,
+    index: VertexNumbers,
+    grid_vertex: VertexNumbers,
     rows: Float[np.ndarray, "V d coordinates"],
 ) -> Vertices:
     """Vertices with their frames; `rows` are nearby planes."""
@@ -144,9 +145,9 @@ def _with_slopes(
     setting: Setting,
     z: Float[np.ndarray, "V size"],
     p: Float[np.ndarray, "V P"],
-    kinds: Int[np.ndarray, " V"],
-    index: Int[np.ndarray, " V"],
-    grid_vertex: Int[np.ndarray, " V"],
+    kinds: VertexNumbers,
+    index: VertexNumbers,
+    grid_vertex: VertexNumbers,
     frame: Float[np.ndarray, "V d full"],
     slopes: tuple[Float[np.ndarray, "V d"], Float[np.ndarray, "V d"], Float[np.ndarray, "V d"]],
 ) -> Vertices:
@@ -158,7 +159,7 @@ def _with_slopes(
 
 def on_constraints(
     setting: Setting, z: Float[np.ndarray, "n size"], p: Float[np.ndarray, "n P"]
-) -> Bool[np.ndarray, " n"]:
+) -> ItemFlags:
     """Whether states lie on the bound of a constraint."""
     out = np.zeros(len(z), bool)
     for constraint in setting.constraints if len(z) else ():

@@ -11,9 +11,9 @@ from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 
-from equimorph.arrays import Flags, Frames, Lanes, Parameters, Rows, Values
+from equimorph.arrays import Flags, Frames, Lanes, Numbers, Parameters, Rows, Values
 from equimorph.columns import Columns
 from equimorph.equilibria.critical import null_border
 from equimorph.equilibria.point_conditions import Condition, Crossing, Fold, Plane
@@ -25,7 +25,6 @@ from equimorph.manifold.geometry.setting import Setting, embed, principal_direct
 from equimorph.model import worst_excess
 
 Span = Float[np.ndarray, "lanes k d"]
-Numbers = Int[np.ndarray, " lanes"]
 
 LED = (3, 12)
 """Steps from a known fold to the middle between several: few, else many. Of 645 points that one
@@ -192,12 +191,7 @@ def correct_between(
 
 
 def _settle_guarded(
-    aim: Aim,
-    z: Lanes,
-    p: Parameters,
-    around: Values,
-    lower: Numbers | None,
-    index: Numbers | None,
+    aim: Aim, z: Lanes, p: Parameters, around: Values, lower: Numbers | None, index: Numbers | None
 ) -> Settled:
     """Newton's method with the guards of the set."""
     setting, centre = aim.setting, aim.centre(p)
@@ -279,14 +273,7 @@ def pin(
     return pinned
 
 
-def _lead(
-    aim: Aim,
-    steps: int,
-    z: Lanes,
-    p: Parameters,
-    around: Values,
-    low: Numbers,
-) -> Pinned:
+def _lead(aim: Aim, steps: int, z: Lanes, p: Parameters, around: Values, low: Numbers) -> Pinned:
     """Compute folds in small steps from known ones to the middle, where a single step diverges."""
     z, p = z.copy(), p.copy()
     found = np.ones(len(z), bool)

@@ -6,6 +6,7 @@ from enum import IntEnum
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from equimorph.arrays import Some
 from equimorph.manifold.geometry.kernels import match_or_add
 from equimorph.structures import Structure
 from equimorph.tolerances import SAME_STATE
@@ -77,11 +78,11 @@ class Points:
 
     def over_vertices(
         self,
-        vertices: Int[np.ndarray, " some"],
+        vertices: Some,
         z: Float[np.ndarray, "some size"],
         p: Float[np.ndarray, "some parameters"],
-        index: Int[np.ndarray, " some"],
-    ) -> tuple[Int[np.ndarray, " some"], Bool[np.ndarray, " some"]]:
+        index: Some,
+    ) -> tuple[Some, Bool[np.ndarray, " some"]]:
         """Numbers of polished equilibria over vertices, known or added, and which are new."""
         self._reserve(len(vertices))
         ids, new = np.empty(len(vertices), int), np.empty(len(vertices), bool)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from equimorph.arrays import Lanes, Parameters
+from equimorph.arrays import Lanes, Parameters, Place
 from equimorph.model import Constraint
 from equimorph.structures import Structure
 
@@ -26,7 +26,7 @@ class Setting:
         return p
 
     @property
-    def scales(self) -> Float[np.ndarray, " d"]:
+    def scales(self) -> Place:
         """Scales of the free parameters."""
         return np.asarray(self.structure.scales[self.free])
 

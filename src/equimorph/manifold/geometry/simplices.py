@@ -3,8 +3,10 @@
 import numpy as np
 from jaxtyping import Float
 
+from equimorph.arrays import ItemValues, Place, Places
 
-def volumes(corners: Float[np.ndarray, "n corners d"]) -> Float[np.ndarray, " n"]:
+
+def volumes(corners: Float[np.ndarray, "n corners d"]) -> ItemValues:
     """Signed lengths, areas or volumes of d-simplices in d dimensions, with d + 1 corners."""
     sides = corners[:, 1:] - corners[:, :1]
     d = sides.shape[1]
@@ -17,7 +19,7 @@ def volumes(corners: Float[np.ndarray, "n corners d"]) -> Float[np.ndarray, " n"
 
 
 def barycentric(
-    corners: Float[np.ndarray, "n corners d"], point: Float[np.ndarray, " d"]
+    corners: Float[np.ndarray, "n corners d"], point: Place
 ) -> Float[np.ndarray, "n corners"]:
     """Barycentric coordinates of a point in simplices; −∞ in those without volume."""
     whole, count = volumes(corners), corners.shape[1]
@@ -31,7 +33,7 @@ def barycentric(
 
 
 def shares_in(
-    corners: Float[np.ndarray, "n corners d"], places: Float[np.ndarray, "n d"]
+    corners: Float[np.ndarray, "n corners d"], places: Places
 ) -> Float[np.ndarray, "n corners"]:
     """Barycentric coordinates, each place in its own simplex or orthogonally above it."""
     sides = corners[:, 1:] - corners[:, :1]

@@ -5,9 +5,19 @@ from functools import cached_property
 from itertools import combinations
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 
-from equimorph.arrays import Frames, Lanes, Parameters, Rows, Values
+from equimorph.arrays import (
+    CellNumbers,
+    Cells,
+    Frames,
+    Items,
+    Lanes,
+    Parameters,
+    Places,
+    Rows,
+    Values,
+)
 from equimorph.columns import Columns
 from equimorph.equilibria.critical import Critical, null_border
 from equimorph.equilibria.newton_step import free_directions, weights_of
@@ -162,11 +172,7 @@ class Cubics:
 
 
 def best_corners(
-    setting: Setting,
-    z: Lanes,
-    p: Parameters,
-    cells: Int[np.ndarray, "C corners"],
-    signs: Int[np.ndarray, " C"] | None = None,
+    setting: Setting, z: Lanes, p: Parameters, cells: Cells, signs: CellNumbers | None = None
 ) -> Rows:
     """Orthonormal bases of the planes of the cell around each vertex that is the least slender.
 
@@ -191,7 +197,7 @@ def best_corners(
 
 
 def _breadths(
-    place: Float[np.ndarray, "V coordinates"], cells: Int[np.ndarray, "C corners"]
+    place: Float[np.ndarray, "V coordinates"], cells: Cells
 ) -> Float[np.ndarray, "C corners"]:
     """How far the sides from each corner are from dependent: the determinant of their cosines."""
     corners = cells.shape[1]
@@ -220,11 +226,11 @@ class FoldForms:
     """
 
     null: Lanes
-    slope: Float[np.ndarray, "n d"]
+    slope: Places
     bend: Values
 
     @property
-    def existence(self) -> Float[np.ndarray, "n d"]:
+    def existence(self) -> Places:
         """Vectors, in scaled free parameters, towards the side of a fold where sheets exist.
 
         They are continuous along a fold and turn round only at a cusp.
@@ -232,7 +238,7 @@ class FoldForms:
         return np.asarray(-self.slope * np.sign(self.bend)[:, None])
 
 
-def fold_forms(setting: Setting, points: Points, folds: Int[np.ndarray, " n"]) -> FoldForms:
+def fold_forms(setting: Setting, points: Points, folds: Items) -> FoldForms:
     """Coefficients at points on folds."""
     structure, free = setting.structure, setting.free
     z, p = points.z[folds], points.p[folds]

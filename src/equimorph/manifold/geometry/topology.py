@@ -8,14 +8,22 @@ from jaxtyping import Bool, Float, Int
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from equimorph.arrays import Cells
+from equimorph.arrays import (
+    CellFlags,
+    CellNumbers,
+    Cells,
+    Facets,
+    ItemFlags,
+    Items,
+    Pairs,
+    VertexFlags,
+    VertexNumbers,
+)
 from equimorph.manifold.geometry.kernels import orient
 from equimorph.manifold.geometry.simplices import volumes
 
 PAIR = 2
 """Corners of an edge."""
-
-Pairs = Int[np.ndarray, "n 2"]
 
 
 @dataclass(frozen=True)
@@ -29,7 +37,7 @@ class Adjacency:
 
     facets: Int[np.ndarray, "F d"]
     counts: Int[np.ndarray, " F"]
-    cell_facets: Int[np.ndarray, "C corners"]
+    cell_facets: Cells
     links: Int[np.ndarray, "N 2"]
     across: Int[np.ndarray, " N"]
 
@@ -39,7 +47,7 @@ class Adjacency:
         return np.asarray(self.counts[self.across] == 2)
 
 
-def keys_of(rows: Int[np.ndarray, "n k"], base: int) -> Int[np.ndarray, " n"]:
+def keys_of(rows: Int[np.ndarray, "n k"], base: int) -> Items:
     """One number per sorted row of vertices below `base`."""
     assert base ** rows.shape[1] < 2**63, "more vertices than fit into a key"
     if rows.shape[1] == 2:  # much cheaper than sorting pairs
@@ -50,7 +58,7 @@ def keys_of(rows: Int[np.ndarray, "n k"], base: int) -> Int[np.ndarray, " n"]:
     return keys
 
 
-def rows_of(keys: Int[np.ndarray, " n"], base: int, length: int) -> Int[np.ndarray, "n k"]:
+def rows_of(keys: Items, base: int, length: int) -> Int[np.ndarray, "n k"]:
     """Rows of vertices that `keys_of` made keys of."""
     columns = []
     for _ in range(length):
@@ -67,7 +75,7 @@ def faces_of(cells: Cells, size: int) -> Int[np.ndarray, "n size"]:
     return rows_of(keys, base, size)
 
 
-def distinct(keys: Int[np.ndarray, " n"]) -> Int[np.ndarray, " m"]:
+def distinct(keys: Items) -> Int[np.ndarray, " m"]:
     """Return distinct numbers, none negative, in order.
 
     Sorting beats the hashing of `np.unique` several times over.
@@ -76,7 +84,7 @@ def distinct(keys: Int[np.ndarray, " n"]) -> Int[np.ndarray, " m"]:
     return keys[np.diff(keys, prepend=-1) > 0]
 
 
-def among(keys: Int[np.ndarray, " n"], known: Int[np.ndarray, " m"]) -> Bool[np.ndarray, " n"]:
+def among(keys: Items, known: Int[np.ndarray, " m"]) -> ItemFlags:
     """Which keys are among known ones that are in order."""
     if len(known) == 0:
         return np.zeros(len(keys), bool)
@@ -84,9 +92,7 @@ def among(keys: Int[np.ndarray, " n"], known: Int[np.ndarray, " m"]) -> Bool[np.
     return np.asarray(known[at] == keys)
 
 
-def count_corners(
-    chosen: Bool[np.ndarray, " V"], cells: Int[np.ndarray, "n corners"]
-) -> Int[np.ndarray, " n"]:
+def count_corners(chosen: VertexFlags, cells: Int[np.ndarray, "n corners"]) -> Items:
     """How many corners of each cell are among the chosen vertices.
 
     Column by column: reductions over rows of a few flags cost several times as much.
@@ -117,9 +123,7 @@ def adjacency(cells: Cells) -> Adjacency:
     )
 
 
-def _groups(
-    keys: Int[np.ndarray, " n"],
-) -> tuple[Int[np.ndarray, " n"], Int[np.ndarray, " starts"]]:
+def _groups(keys: Items) -> tuple[Items, Int[np.ndarray, " starts"]]:
     """Order of numbers, equal ones as they come, and where each group of these starts, and ends.
 
     Most groups have at most two: then the fast sort, which may exchange equal ones, is put right.
@@ -135,15 +139,13 @@ def _groups(
     return order, starts
 
 
-def flags_of(
-    facets: Int[np.ndarray, "F d"], chosen: Int[np.ndarray, "n d"]
-) -> Bool[np.ndarray, " F"]:
+def flags_of(facets: Int[np.ndarray, "F d"], chosen: Facets) -> Bool[np.ndarray, " F"]:
     """Which of the facets are among the chosen ones."""
     base = max(int(facets.max(initial=0)), int(chosen.max(initial=0))) + 1
     return np.isin(keys_of(facets, base), keys_of(chosen, base))
 
 
-def labels(cells: int, links: Pairs) -> Int[np.ndarray, " C"]:
+def labels(cells: int, links: Pairs) -> CellNumbers:
     """Connected pieces of cells over links, largest first."""
     graph = coo_array((np.ones(len(links)), (links[:, 0], links[:, 1])), shape=(cells, cells))
     _, label = connected_components(graph, directed=False)
@@ -167,7 +169,7 @@ def euler_characteristic(cells: Cells, edges: int | None = None) -> int:
     return int(signs @ [*numbers, len(cells)])
 
 
-def pieces(facets: Int[np.ndarray, "n d"]) -> list[Int[np.ndarray, "..."]]:
+def pieces(facets: Facets) -> list[Int[np.ndarray, "..."]]:
     """Connected pieces of points, edges or triangles.
 
     Points come one by one, edges as polylines (see `chains`), triangles as arrays of them.
@@ -209,7 +211,7 @@ def chains(pairs: Pairs) -> list[Int[np.ndarray, "..."]]:
     return out
 
 
-def orientation(cells: Cells, whole: Adjacency) -> tuple[Int[np.ndarray, " C"], int]:
+def orientation(cells: Cells, whole: Adjacency) -> tuple[CellNumbers, int]:
     """Signs that orient all cells coherently, and the number of contradictions."""
     count = len(cells)
     induced = _induced_signs(cells)
@@ -224,7 +226,7 @@ def orientation(cells: Cells, whole: Adjacency) -> tuple[Int[np.ndarray, " C"], 
     return signs, int(orient(count, starts, columns[0], columns[1], signs)) // 2
 
 
-def _induced_signs(cells: Cells) -> Int[np.ndarray, "C corners"]:
+def _induced_signs(cells: Cells) -> Cells:
     """Orientation that each cell gives its facets, relative to their vertices in order."""
     corners = cells.shape[1]
     signs = np.empty(cells.shape, np.int64)
@@ -238,10 +240,7 @@ def _induced_signs(cells: Cells) -> Int[np.ndarray, "C corners"]:
 
 
 def _sign_at(
-    whole: Adjacency,
-    induced: Int[np.ndarray, "C corners"],
-    cell: Int[np.ndarray, " N"],
-    facet: Int[np.ndarray, " N"],
+    whole: Adjacency, induced: Cells, cell: Int[np.ndarray, " N"], facet: Int[np.ndarray, " N"]
 ) -> Int[np.ndarray, " N"]:
     corner = (whole.cell_facets[cell] == facet[:, None]).argmax(axis=1)
     return np.asarray(induced[cell, corner])
@@ -262,17 +261,17 @@ class Senses:
     has the sign of the parity of their index; overturned: cells that project against it.
     """
 
-    signs: Int[np.ndarray, " C"]
+    signs: CellNumbers
     contradictions: int
-    overturned: Bool[np.ndarray, " C"]
+    overturned: CellFlags
 
 
 def senses(
     cells: Cells,
-    index: Int[np.ndarray, " C"],
+    index: CellNumbers,
     coordinates: Float[np.ndarray, "V d"],
     whole: Adjacency,
-    component: Int[np.ndarray, " C"] | None = None,
+    component: CellNumbers | None = None,
 ) -> Senses:
     """Orientation of cells with the index that each has.
 
@@ -302,7 +301,7 @@ def count_unbalanced(
 
 def cut_at_crossings(
     cells: Cells, crossings: Int[np.ndarray, "x d"], count: int
-) -> tuple[Cells, Int[np.ndarray, " V"]]:
+) -> tuple[Cells, VertexNumbers]:
     """Cells parted at facets on crossings, and for each vertex then the one that it was.
 
     Cells keep a vertex of a crossing in common as long as facets lead from one to the other around

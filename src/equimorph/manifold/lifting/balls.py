@@ -13,6 +13,7 @@ from itertools import product
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from equimorph.arrays import Items
 from equimorph.manifold.complex.base_mesh import BaseMesh
 from equimorph.manifold.geometry.exact_points import Pinned, Span, middles, pin, pin_crossings
 from equimorph.manifold.geometry.points import Points, VertexKind
@@ -99,8 +100,8 @@ class Balls:
     """
 
     corners: Int[np.ndarray, "n 4"]
-    index: Int[np.ndarray, " n"]
-    owner: Int[np.ndarray, " n"]
+    index: Items
+    owner: Items
     folds: Int[np.ndarray, "f 3"]
     fold_owner: Int[np.ndarray, " f"]
     caps: Int[np.ndarray, "c 3"]
@@ -179,7 +180,7 @@ def _caps(
 
 
 def _group(
-    group: Int[np.ndarray, " n"], points: Int[np.ndarray, "n k"], groups: int
+    group: Items, points: Int[np.ndarray, "n k"], groups: int
 ) -> tuple[Int[np.ndarray, " m"], Int[np.ndarray, " m"]]:
     """Distinct points of each group, in order: their groups and their numbers."""
     base = int(points.max(initial=0)) + 1

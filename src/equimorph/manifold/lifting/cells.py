@@ -6,6 +6,7 @@ from itertools import pairwise
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from equimorph.arrays import CellNumbers, Facets, Items
 from equimorph.manifold.complex.description import Complex, Frame, Lifting, describe
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.manifold.geometry.points import VertexKind
@@ -143,12 +144,12 @@ class Cells:
     """
 
     corners: Int[np.ndarray, "C corners"]
-    index: Int[np.ndarray, " C"]
+    index: CellNumbers
     folds: Int[np.ndarray, "f d"]
     caps: Int[np.ndarray, "c d"]
     crossings: Int[np.ndarray, "x d"]
     doubtful_triangles: Int[np.ndarray, " t"] = field(default_factory=_nothing)
-    doubtful_tetrahedra: Int[np.ndarray, " n"] = field(default_factory=_nothing)
+    doubtful_tetrahedra: Items = field(default_factory=_nothing)
     touching: Float[np.ndarray, "places axes"] = field(default_factory=lambda: np.zeros((0, 0)))
 
     @property
@@ -203,12 +204,7 @@ def _segments(pairing: Pairing) -> Cells:
     return Cells(corners, index[regular], *marked)
 
 
-def account(
-    pairing: Pairing,
-    cells: Cells,
-    frame: Frame,
-    bisected: int,
-) -> EquilibriumSet:
+def account(pairing: Pairing, cells: Cells, frame: Frame, bisected: int) -> EquilibriumSet:
     """Number the used points, find pieces, folds and boundaries, and write the audit."""
     used = np.flatnonzero(np.bincount(cells.corners.ravel(), minlength=pairing.points.count))
     number = np.full(pairing.points.count, -1)
@@ -237,7 +233,7 @@ def account(
     return describe(frame, whole, lifting)
 
 
-def _facets_in_use(facets: Int[np.ndarray, "n d"]) -> Int[np.ndarray, "m d"]:
+def _facets_in_use(facets: Facets) -> Int[np.ndarray, "m d"]:
     """Facets whose points are all in use."""
     return facets[(facets >= 0).all(axis=1)]
 

@@ -7,6 +7,7 @@ lifted in a step that did not notice the crossing, it is traced again in finer s
 import numpy as np
 from jaxtyping import Float, Int
 
+from equimorph.arrays import Items
 from equimorph.equilibria import ParameterLine, TraceOptions
 from equimorph.equilibria.critical import null_border
 from equimorph.equilibria.steps import Front, step_along
@@ -49,7 +50,7 @@ def flood_crossings(pairing: Pairing, progress: Progress) -> None:
         flood(pairing, progress)
 
 
-def lonely(pairing: Pairing) -> Int[np.ndarray, " n"]:
+def lonely(pairing: Pairing) -> Items:
     """Crossings of edges in use through which other than two curves lead."""
     curves, used = pairing.curves, pairing.mesh.edges_in_use
     through = {point: 0 for edge, own in pairing.crossings.items() if used[edge] for point in own}
@@ -62,7 +63,7 @@ def lonely(pairing: Pairing) -> Int[np.ndarray, " n"]:
     return np.array([point for point, count in through.items() if 0 < count != CURVES], int)
 
 
-def _trace_again(pairing: Pairing, alone: Int[np.ndarray, " n"]) -> None:
+def _trace_again(pairing: Pairing, alone: Items) -> None:
     """Forget plain curves over the edges of crossings, and have them traced with more care."""
     edges = set(pairing.points.edge[alone].tolist())
     curves = pairing.curves
@@ -73,7 +74,7 @@ def _trace_again(pairing: Pairing, alone: Int[np.ndarray, " n"]) -> None:
         pairing.effort[edge] = min(pairing.effort[edge] + 1, EFFORTS - 1)
 
 
-def _switch(pairing: Pairing, alone: Int[np.ndarray, " n"]) -> None:
+def _switch(pairing: Pairing, alone: Items) -> None:
     """Enter the equilibria over vertices that the curves through crossings lead to."""
     pairing.points.over_vertices(*_beyond(pairing, alone))
     pairing.fit()
@@ -112,7 +113,7 @@ def _beyond(pairing: Pairing, alone: Int[np.ndarray, " crossings"]) -> Seeds:
 
 
 def _starts(
-    pairing: Pairing, alone: Int[np.ndarray, " n"], line: ParameterLine
+    pairing: Pairing, alone: Items, line: ParameterLine
 ) -> tuple[Int[np.ndarray, " m"], Front]:
     """Numbers of the half-branches at all crossings, four each, and points on them."""
     store = pairing.points
@@ -138,7 +139,7 @@ def _starts(
 
 def _enter_arcs(
     pairing: Pairing,
-    alone: Int[np.ndarray, " n"],
+    alone: Items,
     halves: Int[np.ndarray, " m"],
     line: ParameterLine,
     outcome: Traces,

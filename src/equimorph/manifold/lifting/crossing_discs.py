@@ -12,6 +12,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.optimize import brentq
 
+from equimorph.arrays import ItemValues
 from equimorph.equilibria.critical import Critical, null_border
 from equimorph.equilibria.settle import lower_index
 from equimorph.manifold.geometry.exact_points import (
@@ -223,7 +224,7 @@ def _coefficients(
     z: Float[np.ndarray, "n size"],
     p: Float[np.ndarray, "n P"],
     sense: Float[np.ndarray, " size"],
-) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"]]:
+) -> tuple[ItemValues, ItemValues]:
     """Quadratic and cubic coefficient with null vectors that do not point against `sense`."""
     structure, n = pairing.setting.structure, pairing.setting.structure.unknowns
     b = null_border(structure, z, p)

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from equimorph.arrays import Items, Places, Triples
 from equimorph.manifold.geometry.exact_points import pin
 from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.setting import embed
@@ -51,11 +52,11 @@ class Discs:
     sheet that it belongs to.
     """
 
-    corners: Int[np.ndarray, "n 3"]
-    index: Int[np.ndarray, " n"]
-    owner: Int[np.ndarray, " n"]
+    corners: Triples
+    index: Items
+    owner: Items
     met: Bool[np.ndarray, "n 3"]
-    sheet: Int[np.ndarray, " n"]
+    sheet: Items
     folds: Int[np.ndarray, "f 2"]
     caps: Int[np.ndarray, "c 2"]
     crossings: Int[np.ndarray, "x 2"]
@@ -101,7 +102,7 @@ def assemble(pairing: Pairing, loops: Loops) -> Discs:
     )
 
 
-def _on(corners: Int[np.ndarray, "n 3"], chosen: Int[np.ndarray, "k 2"]) -> Bool[np.ndarray, "n 3"]:
+def _on(corners: Triples, chosen: Int[np.ndarray, "k 2"]) -> Bool[np.ndarray, "n 3"]:
     """Which sides ab, bc, ca of triangles are among the chosen ones."""
     if len(chosen) == 0:
         return np.zeros(corners.shape, bool)
@@ -244,7 +245,7 @@ def _continuous(pairing: Pairing, plans: list[Plan], choices: list[Ways]) -> lis
 
 
 def _along_sides(
-    pairing: Pairing, triangles: list[int], normals: Float[np.ndarray, "n d"]
+    pairing: Pairing, triangles: list[int], normals: Places
 ) -> Float[np.ndarray, "n 2"]:
     """Components of normals to curves in coordinates in which their grid triangles are equilateral.
 

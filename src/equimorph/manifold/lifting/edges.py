@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from equimorph.arrays import Flags, Lanes
+from equimorph.arrays import Flags, ItemFlags, Items, Lanes, Numbers
 from equimorph.equilibria import Guards, ParameterLine, TraceOptions, settle
 from equimorph.equilibria.curves import squared_length
 from equimorph.equilibria.kernels import FIRST_SHARE, LEAST_COSINE, MULTIPLIER_WEIGHT
@@ -40,7 +40,7 @@ class Direct:
 def lift_directly(
     line: ParameterLine,
     z: Lanes,
-    index: Int[np.ndarray, " lanes"],
+    index: Numbers,
     constraints: tuple[Constraint, ...],
     steps: int = 1,
 ) -> Direct:
@@ -65,10 +65,7 @@ def lift_directly(
 
 
 def _step(
-    line: ParameterLine,
-    z: Lanes,
-    index: Int[np.ndarray, " lanes"],
-    constraints: tuple[Constraint, ...],
+    line: ParameterLine, z: Lanes, index: Numbers, constraints: tuple[Constraint, ...]
 ) -> Direct:
     """One step over each line, verified."""
     lanes = len(z)
@@ -122,7 +119,7 @@ class Traced:
     good: Bool[np.ndarray, " rays"]
     vertices: Int[np.ndarray, " rays"]
     z: Float[np.ndarray, "n size"]
-    index: Int[np.ndarray, " n"]
+    index: Items
     lanes: Int[np.ndarray, " m"]
     inner_z: Float[np.ndarray, "m size"]
     inner_p: Float[np.ndarray, "m P"]
@@ -205,7 +202,7 @@ def _follow(pairing: Pairing, rays: Rays, line: ParameterLine, options: TraceOpt
     )  # fmt: skip
 
 
-def _ends(pairing: Pairing, traced: Traced) -> Int[np.ndarray, " lanes"]:
+def _ends(pairing: Pairing, traced: Traced) -> Numbers:
     """Points over the vertices at which lanes arrived or to which they returned; −1 elsewhere."""
     lanes = np.flatnonzero(traced.good & (traced.vertices >= 0))
     vertices = traced.vertices[lanes]
@@ -226,11 +223,7 @@ def _caps(pairing: Pairing, outcome: Traces, line: ParameterLine, good: Flags) -
 
 
 def _inner(
-    pairing: Pairing,
-    rays: Rays,
-    outcome: Traces,
-    line: ParameterLine,
-    good: Flags,
+    pairing: Pairing, rays: Rays, outcome: Traces, line: ParameterLine, good: Flags
 ) -> dict[int, list[Inner]]:
     """Folds and crossings of each lane in order, with one regular point between neighbours.
 
@@ -268,9 +261,7 @@ def _inner(
     return rows
 
 
-def _first_ones(
-    pairing: Pairing, lanes: Int[np.ndarray, " n"], pinned: Pinned
-) -> Bool[np.ndarray, " n"]:
+def _first_ones(pairing: Pairing, lanes: Items, pinned: Pinned) -> ItemFlags:
     """Which crossings are not those that their lanes met just before."""
     place = embed(pairing.setting, pinned.z, pinned.p)
     gap = np.linalg.norm(np.diff(place, axis=0), axis=1)

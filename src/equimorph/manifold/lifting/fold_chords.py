@@ -9,9 +9,9 @@ that are joined between them, by a neck that is smaller than the triangle.
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float
 
-from equimorph.arrays import Flags, Some, Values
+from equimorph.arrays import Flags, Pairs, Places, Some, Values
 from equimorph.columns import Columns
 from equimorph.manifold.geometry.exact_points import pin
 from equimorph.manifold.geometry.points import VertexKind
@@ -40,7 +40,7 @@ class FoldChords(Columns):
     in scaled free parameters; cusped: whether there is a cusp between the ends.
     """
 
-    ends: Int[np.ndarray, "n 2"]
+    ends: Pairs
     triangle: Some
     normals: Float[np.ndarray, "n 2 d"]
     cusped: Flags
@@ -83,7 +83,7 @@ class Turns(Columns):
     between its ends, if it is one; inside: whether it is one, and in the triangle.
     """
 
-    ends: Int[np.ndarray, "n 2"]
+    ends: Pairs
     triangle: Some
     normals: Float[np.ndarray, "n 2 d"]
     z: Float[np.ndarray, "n size"]
@@ -142,9 +142,7 @@ def facing_folds(pairing: Pairing, chords: FoldChords) -> Facing:
     return Facing(one[near], other[near], starts.take(near))
 
 
-def beyond_folds(
-    pairing: Pairing, chords: FoldChords, facing: Facing, place: Float[np.ndarray, "n d"]
-) -> Flags:
+def beyond_folds(pairing: Pairing, chords: FoldChords, facing: Facing, place: Places) -> Flags:
     """Whether places lie on those sides of the chords on which the set has no sheets."""
     scales, points = pairing.setting.scales, pairing.points
     pairs = np.stack([facing.one, facing.other], axis=1)
@@ -157,7 +155,7 @@ def beyond_folds(
     return np.asarray((off.sum(axis=-1) < 0.0).all(axis=1))
 
 
-def _meetings(pairing: Pairing, chords: FoldChords) -> Float[np.ndarray, "n d"]:
+def _meetings(pairing: Pairing, chords: FoldChords) -> Places:
     """Free parameters where the tangents of folds at both ends meet."""
     scales = pairing.setting.scales
     ends = pairing.points.p[chords.ends][:, :, pairing.setting.free] / scales

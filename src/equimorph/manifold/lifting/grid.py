@@ -10,6 +10,7 @@ from itertools import permutations
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from equimorph.arrays import Place, Some
 from equimorph.manifold.complex.base_mesh import BaseMesh, mesh_of
 from equimorph.model import Box
 
@@ -102,7 +103,7 @@ def coarse_grid(
 
 def bisect(
     mesh: BaseMesh,
-    chosen: Int[np.ndarray, " some"],
+    chosen: Some,
     mirrored: tuple[bool, ...],
     shares: Mapping[int, float] | None = None,
 ) -> BaseMesh:
@@ -136,7 +137,7 @@ class _Growth:
     sides: Int[np.ndarray, "T 3"]
     tetrahedra: Int[np.ndarray, "N 4"]
     faces: Int[np.ndarray, "N 4"]
-    vertices: list[Float[np.ndarray, " d"]] = field(default_factory=list)
+    vertices: list[Place] = field(default_factory=list)
     edges: list[tuple[int, int]] = field(default_factory=list)
     more_triangles: list[tuple[list[int], list[int]]] = field(default_factory=list)
     more_tetrahedra: list[tuple[list[int], list[int]]] = field(default_factory=list)
@@ -164,9 +165,7 @@ class _Growth:
         )
 
 
-def _around(
-    mesh: BaseMesh, chosen: Int[np.ndarray, " some"]
-) -> tuple[dict[int, list[int]], dict[int, list[int]]]:
+def _around(mesh: BaseMesh, chosen: Some) -> tuple[dict[int, list[int]], dict[int, list[int]]]:
     """Triangles and tetrahedra that contain each of some edges."""
     wanted = np.zeros(len(mesh.edges), bool)
     wanted[chosen] = True
@@ -183,11 +182,7 @@ def _around(
 
 
 def _split(
-    growth: _Growth,
-    mesh: BaseMesh,
-    edge: int,
-    place: Float[np.ndarray, " d"],
-    around: tuple[list[int], list[int]],
+    growth: _Growth, mesh: BaseMesh, edge: int, place: Place, around: tuple[list[int], list[int]]
 ) -> None:
     """Split an edge and the triangles and tetrahedra around it, all of them unsplit so far."""
     a, b = mesh.edges[edge].tolist()
@@ -248,12 +243,7 @@ def _side_between(mesh: BaseMesh, triangle: int, pair: tuple[int, int]) -> int:
     return next(side for side in sides if set(mesh.edges[side].tolist()) == set(pair))
 
 
-def _between(
-    a: Float[np.ndarray, " d"],
-    b: Float[np.ndarray, " d"],
-    share: float,
-    mirrored: tuple[bool, ...],
-) -> Float[np.ndarray, " d"]:
+def _between(a: Place, b: Place, share: float, mirrored: tuple[bool, ...]) -> Place:
     """Point of an edge, or one next to it if it lies on a line of symmetry."""
     place = a + share * (b - a)
     on_line: Bool[np.ndarray, " d"] = np.array(mirrored)

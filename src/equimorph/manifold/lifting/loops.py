@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Int
 
+from equimorph.arrays import Items, Some
 from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.geometry.tangents import frames_in_embedding, tangent_frames
@@ -168,7 +169,7 @@ def _close_themselves(pairing: Pairing, chains: list[Polygon]) -> bool:
 
 
 def _plain(
-    pairing: Pairing, triangles: Int[np.ndarray, " some"]
+    pairing: Pairing, triangles: Some
 ) -> tuple[Int[np.ndarray, "P 3"], Int[np.ndarray, " P"], Int[np.ndarray, " S"]]:
     """Loops of three curves that go straight across; triangles over which other loops exist."""
     mesh, points = pairing.mesh, pairing.points
@@ -207,11 +208,8 @@ def _partners(pairing: Pairing) -> Int[np.ndarray, "count slots"]:
 
 
 def _across(
-    pairing: Pairing,
-    partner: Int[np.ndarray, "count slots"],
-    point: Int[np.ndarray, " n"],
-    edge: Int[np.ndarray, " n"],
-) -> Int[np.ndarray, " n"]:
+    pairing: Pairing, partner: Int[np.ndarray, "count slots"], point: Items, edge: Items
+) -> Items:
     side = (pairing.mesh.edges[edge, 1] == pairing.points.vertex[point]).astype(int)
     return np.asarray(partner[point, pairing.slots[edge, side]])
 

@@ -6,6 +6,7 @@ from enum import IntEnum
 import numpy as np
 from jaxtyping import Float, Int
 
+from equimorph.arrays import Items
 from equimorph.columns import Columns
 from equimorph.equilibria import ParameterLine
 from equimorph.manifold.complex.base_mesh import BaseMesh
@@ -44,12 +45,7 @@ class Curves:
             self.inner[len(self.edge) - 1] = inner
         return len(self.edge) - 1
 
-    def extend(
-        self,
-        edges: Int[np.ndarray, " n"],
-        starts: Int[np.ndarray, " n"],
-        ends: Int[np.ndarray, " n"],
-    ) -> Int[np.ndarray, " n"]:
+    def extend(self, edges: Items, starts: Items, ends: Items) -> Items:
         """Add curves without inner points; return their numbers."""
         numbers = len(self.edge) + np.arange(len(edges))
         self.edge.extend(edges.tolist())
@@ -62,9 +58,9 @@ class Curves:
 class Rays(Columns):
     """Edges seen from points over one of their ends: the first or the second."""
 
-    points: Int[np.ndarray, " n"]
-    edges: Int[np.ndarray, " n"]
-    sides: Int[np.ndarray, " n"]
+    points: Items
+    edges: Items
+    sides: Items
 
 
 @dataclass
@@ -167,7 +163,7 @@ class Pairing:
         if end >= 0:
             self.set_ray(end, edge, curve)
 
-    def enter_many(self, rays: Rays, ends: Int[np.ndarray, " n"]) -> None:
+    def enter_many(self, rays: Rays, ends: Items) -> None:
         """Register curves that cross their edges: at once where nothing is known, else singly."""
         near, far = (self.slots[rays.edges, side] for side in (rays.sides, 1 - rays.sides))
         _, first, shared = np.unique(

@@ -3,6 +3,7 @@
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from equimorph.arrays import Items, Places, Some
 from equimorph.equilibria import Guards, ParameterLine, TraceOptions, search_points, settle
 from equimorph.equilibria.kernels import MULTIPLIER_WEIGHT
 from equimorph.equilibria.trace import trace
@@ -25,16 +26,14 @@ EXACT = Guards(iterations=1, longest=np.inf, converged=1e-8, multipliers=MULTIPL
 """Equilibria need one correction at most, which squares what is left."""
 
 Seeds = tuple[
-    Int[np.ndarray, " n"],
+    Items,
     Float[np.ndarray, "n size"],
     Float[np.ndarray, "n P"],
-    Int[np.ndarray, " n"],
+    Items,
 ]
 
 
-def seeds(
-    setting: Setting, mesh: BaseMesh, searchable: Int[np.ndarray, " some"], seed: int
-) -> Seeds:
+def seeds(setting: Setting, mesh: BaseMesh, searchable: Some, seed: int) -> Seeds:
     """Vertices, unknowns, parameters and index of first equilibria; deterministic for a `seed`.
 
     Random search is restricted to the `searchable` vertices.
@@ -47,10 +46,7 @@ def seeds(
 
 
 def polish(
-    setting: Setting,
-    mesh: BaseMesh,
-    vertices: Int[np.ndarray, " some"],
-    z: Float[np.ndarray, "some size"],
+    setting: Setting, mesh: BaseMesh, vertices: Some, z: Float[np.ndarray, "some size"]
 ) -> tuple[Seeds, Bool[np.ndarray, " some"]]:
     """Those of the states over vertices that are equilibria, polished; and which.
 
@@ -63,7 +59,7 @@ def polish(
     return (vertices[good], settled.z[good], p[good], settled.index[good]), good
 
 
-def _spread(mesh: BaseMesh) -> tuple[Int[np.ndarray, " n"], Float[np.ndarray, "n d"]]:
+def _spread(mesh: BaseMesh) -> tuple[Items, Places]:
     """About `COARSE` vertices along each parameter, off the lines of symmetry of the box."""
     low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
     share = (np.arange(COARSE) + 0.5) / COARSE
@@ -76,7 +72,7 @@ def _spread(mesh: BaseMesh) -> tuple[Int[np.ndarray, " n"], Float[np.ndarray, "n
 
 
 def _from_natural_states(
-    setting: Setting, vertices: Int[np.ndarray, " n"], points: Float[np.ndarray, "n d"]
+    setting: Setting, vertices: Items, points: Places
 ) -> tuple[Int[np.ndarray, " m"], Float[np.ndarray, "m size"]]:
     structure = setting.structure
     p = setting.parameters(points)
@@ -99,7 +95,7 @@ def _from_natural_states(
 
 
 def _from_search(
-    setting: Setting, mesh: BaseMesh, searchable: Int[np.ndarray, " some"], seed: int
+    setting: Setting, mesh: BaseMesh, searchable: Some, seed: int
 ) -> tuple[Int[np.ndarray, " m"], Float[np.ndarray, "m size"]]:
     generator = np.random.default_rng(seed)
     away = (mesh.vertices[searchable] - mesh.vertices[searchable].mean(axis=0)) / setting.scales

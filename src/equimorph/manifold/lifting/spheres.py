@@ -10,6 +10,7 @@ from jaxtyping import Bool, Float, Int
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from equimorph.arrays import ItemFlags, Items, Pairs, Triples
 from equimorph.manifold.complex.base_mesh import BaseMesh
 from equimorph.manifold.geometry.simplices import volumes
 from equimorph.manifold.geometry.topology import adjacency, distinct, keys_of, labels, orientation
@@ -25,9 +26,9 @@ class Surfaces:
     open sides, with their surface and the adjacent index.
     """
 
-    corners: Int[np.ndarray, "n 3"]
-    index: Int[np.ndarray, " n"]
-    surface: Int[np.ndarray, " n"]
+    corners: Triples
+    index: Items
+    surface: Items
     met: Bool[np.ndarray, "n 3"]
     owner: Int[np.ndarray, " S"]
     rims: Int[np.ndarray, "r 2"]
@@ -54,7 +55,7 @@ class Rings:
     meet at every point.
     """
 
-    label: Int[np.ndarray, " n"]
+    label: Items
     amount: Int[np.ndarray, " groups"]
     closed: Bool[np.ndarray, " groups"]
 
@@ -63,11 +64,11 @@ class Rings:
 class _Copies:
     """Triangles of discs as seen from the grid tetrahedra, sorted by the pieces that they form."""
 
-    corners: Int[np.ndarray, "n 3"]
-    index: Int[np.ndarray, " n"]
-    owner: Int[np.ndarray, " n"]
+    corners: Triples
+    index: Items
+    owner: Items
     met: Bool[np.ndarray, "n 3"]
-    shares: Int[np.ndarray, "n 3"]
+    shares: Triples
     """How many triangles of the same tetrahedron share sides ab, bc, ca; of the same sheet, where
     another crosses."""
     starts: Int[np.ndarray, " pieces"]
@@ -123,7 +124,7 @@ def _surfaces(
     return surfaces, np.unique(copies.owner[copies.starts[bad]])
 
 
-def rings(edges: Int[np.ndarray, "n 2"], group: Int[np.ndarray, " n"], groups: int) -> Rings:
+def rings(edges: Pairs, group: Items, groups: int) -> Rings:
     """Curves of edges that hang together within their group."""
     base = int(edges.max(initial=0)) + 1
     _, ends = np.unique((group[:, None] * base + edges).ravel(), return_inverse=True)
@@ -160,9 +161,7 @@ def _copies(mesh: BaseMesh, discs: Discs, wanted: Bool[np.ndarray, " N"]) -> _Co
     return _Copies(corners, index, owner[order], met[order], shares[order], starts, sizes)
 
 
-def _pieces(
-    corners: Int[np.ndarray, "n 3"], owner: Int[np.ndarray, " n"], sheet: Int[np.ndarray, "n 3"]
-) -> tuple[Int[np.ndarray, "n 3"], Int[np.ndarray, " n"]]:
+def _pieces(corners: Triples, owner: Items, sheet: Triples) -> tuple[Triples, Items]:
     """How many triangles share each side within a tetrahedron, and the pieces that they form.
 
     Sides of different sheets are different, but for sheet 0.
@@ -190,10 +189,10 @@ class Closed:
     tetrahedron, and the point from which the lid was drawn (−1 if there is none).
     """
 
-    corners: Int[np.ndarray, "n 3"]
-    index: Int[np.ndarray, " n"]
-    surface: Int[np.ndarray, " n"]
-    lid: Bool[np.ndarray, " n"]
+    corners: Triples
+    index: Items
+    surface: Items
+    lid: ItemFlags
     met: Bool[np.ndarray, "n 3"]
     owner: Int[np.ndarray, " S"]
     cap: Int[np.ndarray, " S"]
@@ -211,7 +210,7 @@ class Parts:
     """
 
     closed: Closed
-    region: Int[np.ndarray, " n"]
+    region: Items
     region_surface: Int[np.ndarray, " regions"]
     region_index: Int[np.ndarray, " regions"]
     first_curve: Int[np.ndarray, " regions"]
@@ -259,7 +258,7 @@ def closed_surfaces(
 
 
 def _sides_on_crossings(
-    corners: Int[np.ndarray, "n 3"], crossing: Bool[np.ndarray, " points"]
+    corners: Triples, crossing: Bool[np.ndarray, " points"]
 ) -> Bool[np.ndarray, "n 3"]:
     """Which sides ab, bc, ca of lids join two crossings."""
     at = crossing[corners]
@@ -304,7 +303,7 @@ def part(closed: Closed) -> Parts:
 
 
 def _of_regions(
-    region: Int[np.ndarray, " n"], surface: Int[np.ndarray, " n"], index: Int[np.ndarray, " n"]
+    region: Items, surface: Items, index: Items
 ) -> tuple[Int[np.ndarray, " regions"], Int[np.ndarray, " regions"]]:
     """Surface and index of each region."""
     some = np.zeros(int(region.max(initial=-1)) + 1, int)
@@ -324,9 +323,7 @@ NOISE = 1e-9
 """Share of a region's volume that does not count as overturned."""
 
 
-def fans_of(
-    parts: Parts, middles: Int[np.ndarray, " curves"]
-) -> tuple[Int[np.ndarray, "n 3"], Int[np.ndarray, " n"]]:
+def fans_of(parts: Parts, middles: Int[np.ndarray, " curves"]) -> tuple[Triples, Items]:
     """Triangles from the middle of every curve to its sides, and the numbers of these sides."""
     middle = middles[parts.curve]
     fans = np.concatenate([np.sort(parts.folds, axis=1), middle[:, None]], axis=1)
@@ -379,9 +376,7 @@ def _others(
     return caps, np.append(middles, -1)[last]
 
 
-def _coherent(
-    facets: Int[np.ndarray, "n 3"], region: Int[np.ndarray, " n"]
-) -> Int[np.ndarray, " n"]:
+def _coherent(facets: Triples, region: Items) -> Items:
     """Signs that orient the facets around each region coherently."""
     base = int(facets.max(initial=0)) + 1
     _, own = np.unique((region[:, None] * base + facets).ravel(), return_inverse=True)

@@ -14,7 +14,7 @@ from itertools import combinations_with_replacement, product
 import numpy as np
 from jaxtyping import Float, Int
 
-from equimorph.arrays import Flags, Lanes, Parameters, Some, Values
+from equimorph.arrays import Flags, Lanes, Parameters, Places, Some, Values
 from equimorph.columns import Columns
 from equimorph.equilibria.critical import null_border
 from equimorph.equilibria.settle import free_directions
@@ -64,7 +64,7 @@ class Stationary:
     the squared distance is curved in all directions there, as it is not where sheets cross.
     """
 
-    place: Float[np.ndarray, "n d"]
+    place: Places
     squared: Values
     inside: Flags
     lost: Flags
@@ -252,7 +252,7 @@ def _models(pairing: Pairing, pairs: _Pairs, over: _Corners) -> tuple[Values, Sh
     return least / np.maximum(squared.min(axis=1), 1e-300), shares
 
 
-def _slopes(setting: Setting, points: Points, over: _Corners) -> Float[np.ndarray, "n d"]:
+def _slopes(setting: Setting, points: Points, over: _Corners) -> Places:
     """Derivatives of the squared distances with respect to the free parameters."""
     structure, n = setting.structure, setting.structure.unknowns
     used, place = np.unique(np.concatenate([over.one, over.other]), return_inverse=True)

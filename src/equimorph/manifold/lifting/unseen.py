@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from jaxtyping import Bool, Float
 
-from equimorph.arrays import Some
+from equimorph.arrays import CellFlags, Place, Some
 from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.setting import Setting
 from equimorph.manifold.geometry.simplices import shares_in
@@ -91,7 +91,7 @@ def _crossed(pairing: Pairing) -> Bool[np.ndarray, " T"]:
     return np.asarray(crossed[pairing.mesh.sides].any(axis=1))
 
 
-def _holes(pairing: Pairing, cells: Cells, wanted: Bool[np.ndarray, " C"]) -> Unseen:
+def _holes(pairing: Pairing, cells: Cells, wanted: CellFlags) -> Unseen:
     """Cells over which two sheets are joined around a hole inside, and where they touch."""
     starts = approaches(pairing, cells, wanted)
     found = stationary_points(pairing.setting, starts, saddles=False)
@@ -154,7 +154,7 @@ def _exits(pairing: Pairing, turns: Turns) -> dict[int, float]:
 
 def _distinct(places: Places, setting: Setting) -> Places:
     """Places, each once: neighbouring cells find the same."""
-    kept: list[Float[np.ndarray, " d"]] = []
+    kept: list[Place] = []
     for place in places:
         if all(np.linalg.norm((place - other) / setting.scales) > SAME_STATE for other in kept):
             kept.append(place)

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from equimorph.arrays import Items, Place, Places
 from equimorph.columns import Columns
 from equimorph.manifold.geometry.simplices import volumes
 from equimorph.manifold.geometry.topology import Adjacency, keys_of
@@ -52,8 +53,8 @@ class CellIndex:
     barycentric coordinates of x in cell c are ``maps[c] @ (x, 1)``, nan if it has no volume.
     """
 
-    lower: Float[np.ndarray, " d"]
-    width: Float[np.ndarray, " d"]
+    lower: Place
+    width: Place
     counts: Int[np.ndarray, " d"]
     starts: Int[np.ndarray, " bins_and_one"]
     cells: Int[np.ndarray, " entries"]
@@ -93,15 +94,13 @@ class CellIndex:
         starts, cells = _cells_by_bin(first, last, counts)
         return cls(lower, width, counts, starts, cells, _maps(unit), overhang)
 
-    def near(self, points: Float[np.ndarray, "n d"]) -> Hits:
+    def near(self, points: Places) -> Hits:
         """Cells that contain points or that these miss by at most their overhang."""
         bins = self.lower, self.width, self.counts, self.starts, self.cells
         points = np.ascontiguousarray(points, dtype=float)
         return Hits(*cells_near(points, bins, self.maps, self.overhang, NUDGE))
 
-    def weights(
-        self, points: Float[np.ndarray, "n d"], cell: Int[np.ndarray, " n"]
-    ) -> Float[np.ndarray, "n corners"]:
+    def weights(self, points: Places, cell: Items) -> Float[np.ndarray, "n corners"]:
         """Barycentric coordinates of points, each in its cell."""
         unit, maps = (points - self.lower) / self.width, self.maps[cell]
         return np.asarray(np.einsum("nij,nj->ni", maps[:, :, :-1], unit) + maps[:, :, -1])
@@ -149,7 +148,7 @@ def _cells_by_bin(
     return np.concatenate([[0], np.cumsum(filled)]), cells_of[order]
 
 
-def _ranges(start: Int[np.ndarray, " n"], number: Int[np.ndarray, " n"]) -> Int[np.ndarray, " m"]:
+def _ranges(start: Items, number: Items) -> Int[np.ndarray, " m"]:
     """Numbers from each start on, one range after the other."""
     before = np.cumsum(number) - number
     return np.asarray(np.arange(int(number.sum())) + np.repeat(start - before, number))
@@ -160,7 +159,7 @@ BEND = 0.25
 ASIDE = 0.3
 """How far beyond the ends of its facet a band reaches, in barycentric coordinates."""
 
-Points = Float[np.ndarray, "n d"]
+Points = Places
 Facets = Int[np.ndarray, "F d"]
 
 

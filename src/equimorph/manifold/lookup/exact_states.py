@@ -4,7 +4,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy.spatial.distance import cdist
 
-from equimorph.arrays import Flags, Lanes
+from equimorph.arrays import Flags, Lanes, Numbers, Some
 from equimorph.equilibria import ParameterLine, TraceOptions
 from equimorph.equilibria.trace import trace
 from equimorph.equilibria.trace_options import EventCode
@@ -28,8 +28,8 @@ Points = Float[np.ndarray, "points P"]
 
 
 def exact_states(
-    structure: Structure, z: Lanes, p: Points, wanted: Int[np.ndarray, " lanes"] | None = None
-) -> tuple[Lanes, Flags, Int[np.ndarray, " lanes"]]:
+    structure: Structure, z: Lanes, p: Points, wanted: Numbers | None = None
+) -> tuple[Lanes, Flags, Numbers]:
     """States at fixed parameters, exact to round-off; which were found; and their index.
 
     Where there is no state beyond a fold, Newton leaps over the fold again and again: lanes that do
@@ -51,7 +51,7 @@ STRAIGHT_ON = TraceOptions(
 
 def lifts_across_folds(
     states: States, velocity: Points
-) -> tuple[Float[np.ndarray, "some size"], Int[np.ndarray, " some"]]:
+) -> tuple[Float[np.ndarray, "some size"], Some]:
     """States in which moves of the parameters end that turn back at a fold; which moves do."""
     line = ParameterLine(states.structure, states.p.copy(), velocity)
     outcome = trace(line, states.z.copy(), (), STRAIGHT_ON)

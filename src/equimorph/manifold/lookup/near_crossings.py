@@ -18,7 +18,7 @@ import numpy as np
 from jaxtyping import Float, Int
 from numpy.polynomial import chebyshev, legendre
 
-from equimorph.arrays import Cells, Flags, Lanes, Values
+from equimorph.arrays import Cells, Facets, Flags, ItemValues, Lanes, Numbers, Places, Values
 from equimorph.columns import Columns
 from equimorph.equilibria.critical import Critical, null_border
 from equimorph.equilibria.newton_step import Planes
@@ -32,7 +32,6 @@ from equimorph.manifold.lookup.cell_index import Hits
 from equimorph.structures import States
 
 Parameters = Float[np.ndarray, "_ P"]
-Facets = Int[np.ndarray, "n d"]
 Series = Float[np.ndarray, "coefficients lanes"]
 
 NEAR = 1e-4
@@ -63,8 +62,8 @@ class Branches:
     """States near crossing points: their points, and the index of each."""
 
     z: Lanes
-    point: Int[np.ndarray, " lanes"]
-    index: Int[np.ndarray, " lanes"]
+    point: Numbers
+    index: Numbers
 
 
 @dataclass(frozen=True)
@@ -77,9 +76,9 @@ class Centres(Columns):
     size: Values
     """Length in the metric of a unit of s."""
     r: Values
-    low: Int[np.ndarray, " lanes"]
+    low: Numbers
     """Number of negative eigenvalues below the one that vanishes."""
-    point: Int[np.ndarray, " lanes"]
+    point: Numbers
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,12 +91,12 @@ class NearCrossings:
 
     setting: Setting
     points: States
-    facets: Int[np.ndarray, "n d"]
-    cells: Int[np.ndarray, "C corners"]
-    of_cells: Int[np.ndarray, "C corners"]
+    facets: Facets
+    cells: Cells
+    of_cells: Cells
 
     @cached_property
-    def _normal(self) -> Float[np.ndarray, "n d"]:
+    def _normal(self) -> Places:
         """Unit normals of the facets in the scaled parameters."""
         place = self._places(self.points.p)[self.facets]
         sides = place[:, 1:] - place[:, :1]
@@ -105,7 +104,7 @@ class NearCrossings:
         return np.asarray(np.linalg.svd(whole)[2][:, -1])
 
     @cached_property
-    def _bulge(self) -> Float[np.ndarray, " n"]:
+    def _bulge(self) -> ItemValues:
         """How far crossings lie from the middles of their facets, in the scaled parameters."""
         number = np.arange(len(self.facets))
         p = self.points.p[self.facets].mean(axis=1)
@@ -136,7 +135,7 @@ class NearCrossings:
         kept = away <= NEAR + 2.0 * self._bulge[facet]
         return np.unique(np.stack([point[kept], facet[kept]], axis=1), axis=0)
 
-    def _pin(self, p: Parameters, facet: Int[np.ndarray, " lanes"]) -> Pinned:
+    def _pin(self, p: Parameters, facet: Numbers) -> Pinned:
         """Crossing points on lines through points, normal to facets."""
         own = self.facets[facet]
         place = self._places(self.points.p[own])
@@ -230,13 +229,7 @@ class NearCrossings:
         index = own.low + (slope < 0.0)
         return Branches(z[good], own.point[good], index[good]), (x * WIDE)[good]
 
-    def on_branches(
-        self,
-        centres: Centres,
-        p: Parameters,
-        z: Lanes,
-        point: Int[np.ndarray, " lanes"],
-    ) -> Flags:
+    def on_branches(self, centres: Centres, p: Parameters, z: Lanes, point: Numbers) -> Flags:
         """Which states, given with their points, are such that `branches` finds."""
         structure = self.setting.structure
         out = np.zeros(len(z), bool)

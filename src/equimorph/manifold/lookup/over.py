@@ -10,7 +10,17 @@ from functools import cached_property, partial
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from equimorph.arrays import Flags, Lanes
+from equimorph.arrays import (
+    CellFlags,
+    CellNumbers,
+    Cells,
+    Flags,
+    Items,
+    Lanes,
+    Numbers,
+    Some,
+    VertexFlags,
+)
 from equimorph.linalg.lanes import in_background, threads
 from equimorph.manifold.geometry.topology import adjacency, senses
 from equimorph.manifold.lookup.cell_index import NUDGE, CellIndex, Hits, Rims, cells_beside
@@ -42,7 +52,7 @@ first rounds 13 brought states, of two second ones none."""
 CHUNK = 512
 """Points that are served together: their work arrays stay small."""
 
-Found = tuple[Float[np.ndarray, "n size"], Int[np.ndarray, " n"], Int[np.ndarray, " n"]]
+Found = tuple[Float[np.ndarray, "n size"], Items, Items]
 """States, the points that they lie over, and their cells."""
 Guesses = Float[np.ndarray, "hits size"]
 
@@ -69,11 +79,11 @@ class Sheets:
 
     points: States
     free: Int[np.ndarray, " d"]
-    cells: Int[np.ndarray, "C corners"]
-    cell_index: Int[np.ndarray, " C"]
-    component: Int[np.ndarray, " C"]
-    folded: Bool[np.ndarray, " V"]
-    capped: Bool[np.ndarray, " V"]
+    cells: Cells
+    cell_index: CellNumbers
+    component: CellNumbers
+    folded: VertexFlags
+    capped: VertexFlags
     constraints: tuple[Constraint, ...]
     crossings: NearCrossings | None = None
 
@@ -95,12 +105,12 @@ class Sheets:
         return np.asarray(on.sum(axis=1, keepdims=True) - on == on.shape[1] - 1)
 
     @cached_property
-    def _at_an_edge(self) -> Bool[np.ndarray, " C"]:
+    def _at_an_edge(self) -> CellFlags:
         """Cells on folds or constraints, where straight cells miss the curved edge."""
         return np.asarray((self.folded | self.capped)[self.cells].any(axis=1))
 
     @cached_property
-    def _unresolved(self) -> Bool[np.ndarray, " C"]:
+    def _unresolved(self) -> CellFlags:
         """Cells with a vertex that the discretisation does not resolve: so may states near them."""
         return np.asarray(~self.points.resolved[self.cells].all(axis=1))
 
@@ -111,13 +121,13 @@ class Sheets:
         return 1 - 2 * (self.cell_index % 2), self._overturned, self._at_an_edge, capped
 
     @cached_property
-    def _overturned(self) -> Bool[np.ndarray, " C"]:
+    def _overturned(self) -> CellFlags:
         """Cells that project against the orientation that their index demands."""
         places = self.points.p[:, self.free]
         whole = adjacency(self.cells)
         return senses(self.cells, self.cell_index, places, whole).overturned
 
-    def over(self, p: Points) -> tuple[States, Int[np.ndarray, " n"], Int[np.ndarray, " n"]]:
+    def over(self, p: Points) -> tuple[States, Items, Items]:
         """States over points (all parameters given), sorted by point; the points; the cells.
 
         Cells that contain a point, and those on folds and constraints that it just misses, are
@@ -142,7 +152,7 @@ class Sheets:
             z, point, cell = self._beside_crossings(self.crossings, p, z, point, cell)
         return States(self.structure, z, p[point]), point, cell
 
-    def holding(self, states: States) -> tuple[Flags, Int[np.ndarray, " lanes"]]:
+    def holding(self, states: States) -> tuple[Flags, Numbers]:
         """Which states are among those over their own points; their cells, −1 if not known.
 
         The cells whose guesses are nearest to a state are tried first; only for what is not found
@@ -170,12 +180,7 @@ class Sheets:
         return np.asarray((z[:, :n] - other[:, :n]) ** 2 @ self.structure.mass <= SAME_SOLUTION**2)
 
     def _beside_crossings(
-        self,
-        crossings: NearCrossings,
-        p: Points,
-        z: Lanes,
-        point: Int[np.ndarray, " lanes"],
-        cell: Int[np.ndarray, " lanes"],
+        self, crossings: NearCrossings, p: Points, z: Lanes, point: Numbers, cell: Numbers
     ) -> Found:
         """States found over points, where these are close to crossings by the reduced equation."""
         near = self.above.near(p[:, self.free])
@@ -315,7 +320,7 @@ class Sheets:
             yield z[own], point[own], cell
 
     def _distinct(
-        self, z: Lanes, point: Int[np.ndarray, " lanes"], p: Points
+        self, z: Lanes, point: Numbers, p: Points
     ) -> tuple[Float[np.ndarray, "m size"], Int[np.ndarray, " m"], Int[np.ndarray, " m"]]:
         """Different states over each point, those points, sorted, and the index."""
         lanes = [np.flatnonzero(point == number) for number in np.unique(point)]
@@ -328,12 +333,7 @@ class Sheets:
         return z[kept[own]], point[kept[own]], index[own]
 
     def _partners(
-        self,
-        z: Lanes,
-        point: Int[np.ndarray, " lanes"],
-        index: Int[np.ndarray, " lanes"],
-        p: Points,
-        near: Hits,
+        self, z: Lanes, point: Numbers, index: Numbers, p: Points, near: Hits
     ) -> tuple[Float[np.ndarray, "m size"], Int[np.ndarray, " m"]]:
         """States that meet known ones in folds nearby, where parity shows that some are missing.
 
@@ -368,8 +368,8 @@ class Sheets:
         return found, of_found
 
     def _exact(
-        self, starts: Lanes, p: Points, owner: Int[np.ndarray, " lanes"], near: Hits
-    ) -> tuple[Float[np.ndarray, "some size"], Int[np.ndarray, " some"]]:
+        self, starts: Lanes, p: Points, owner: Numbers, near: Hits
+    ) -> tuple[Float[np.ndarray, "some size"], Some]:
         """Admissible states to which Newton leads over the points of the starts; which points."""
         z, good, _ = exact_states(self.structure, starts, p[owner])
         z, owner = z[good], owner[good]
@@ -379,9 +379,7 @@ class Sheets:
         good &= are_feasible(self.constraints, z, p[owner])
         return z[good], owner[good]
 
-    def _nearest(
-        self, z: Lanes, index: Int[np.ndarray, " lanes"], guess: Guesses, mine: Hits
-    ) -> Int[np.ndarray, " n"]:
+    def _nearest(self, z: Lanes, index: Numbers, guess: Guesses, mine: Hits) -> Items:
         """Cell of the same index whose interpolation over the point is nearest to each state."""
         n, mass = self.structure.unknowns, self.structure.mass
         gap = ((z[:, None, :n] - guess[None, :, :n]) ** 2) @ mass

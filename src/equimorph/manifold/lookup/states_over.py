@@ -4,8 +4,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Int
 
+from equimorph.arrays import Numbers
 from equimorph.structures import States
 
 
@@ -30,11 +30,11 @@ class StatesOver:
     """
 
     states: States
-    point: Int[np.ndarray, " lanes"]
-    cell: Int[np.ndarray, " lanes"]
-    index: Int[np.ndarray, " lanes"]
-    stratum: Int[np.ndarray, " lanes"]
-    component: Int[np.ndarray, " lanes"]
+    point: Numbers
+    cell: Numbers
+    index: Numbers
+    stratum: Numbers
+    component: Numbers
     count: int
 
     def __len__(self) -> int:

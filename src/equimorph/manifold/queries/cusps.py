@@ -3,9 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 
 from equimorph.argument_checks import check_arguments
+from equimorph.arrays import CellFlags, Items, ItemValues, Pairs, VertexFlags
 from equimorph.equilibria.critical import Critical, null_border
 from equimorph.equilibria.locus import Locus, nearest
 from equimorph.equilibria.settle import lower_index
@@ -33,7 +34,7 @@ class Cusps:
     """
 
     states: States
-    index: Int[np.ndarray, " n"]
+    index: Items
     lost: int
 
 
@@ -75,7 +76,7 @@ def cusps(eset: EquilibriumSet) -> Cusps:
     return Cusps(States(eset.structure, z, p), index, lost)
 
 
-def _turning_hubs(fabric: Fabric, ends: Int[np.ndarray, "n 2"]) -> Int[np.ndarray, " m"]:
+def _turning_hubs(fabric: Fabric, ends: Pairs) -> Int[np.ndarray, " m"]:
     """Vertices at which the image of a fold turns back as it passes a crossing."""
     store = fabric.vertices
     both = np.concatenate([ends, ends[:, ::-1]])
@@ -90,7 +91,7 @@ def _turning_hubs(fabric: Fabric, ends: Int[np.ndarray, "n 2"]) -> Int[np.ndarra
     return np.asarray(pair[back, 0, 0])
 
 
-def _turning(fabric: Fabric, ends: Int[np.ndarray, "n 2"]) -> Int[np.ndarray, " m"]:
+def _turning(fabric: Fabric, ends: Pairs) -> Int[np.ndarray, " m"]:
     """Edges of folds at whose ends φᵀF_zz[φ, φ] has different signs."""
     folded, at = np.unique(ends, return_inverse=True)
     at = at.reshape(ends.shape)
@@ -120,7 +121,7 @@ def _between(
     return None
 
 
-def with_cusps_beside(fabric: Fabric, beside: Bool[np.ndarray, " C"]) -> Fabric:
+def with_cusps_beside(fabric: Fabric, beside: CellFlags) -> Fabric:
     """The same with vertices at the cusps next to the flagged cells.
 
     A cell that cuts a cusp off is overturned: the sheet around goes all the way round the cusp.
@@ -136,9 +137,7 @@ def with_cusps_beside(fabric: Fabric, beside: Bool[np.ndarray, " C"]) -> Fabric:
     return fabric.bisect(ends[apart], found.take(apart)) if len(apart) else fabric
 
 
-def cusps_on_edges(
-    fabric: Fabric, near: Bool[np.ndarray, " V"] | None = None
-) -> tuple[Int[np.ndarray, "n 2"], Vertices]:
+def cusps_on_edges(fabric: Fabric, near: VertexFlags | None = None) -> tuple[Pairs, Vertices]:
     """Fold edges with cusps, of those with an end near a place, and the cusps."""
     ends = fabric.facets[(fabric.marks & FacetMark.FOLD) > 0]
     if near is not None:
@@ -156,7 +155,7 @@ def cusps_on_edges(
         return ends[:0], store.take(turning)
     lowest = store.index[ends[turning]].min(axis=1)
 
-    def value(at: Vertices, lanes: Int[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
+    def value(at: Vertices, lanes: Items) -> ItemValues:
         return np.asarray(np.einsum("ni,ni->n", side[turning[lanes]], sides_of_existence(at)))
 
     done, found = roots(fabric, ends[turning], FacetMark.FOLD, lowest, known[turning], value)
@@ -165,7 +164,7 @@ def cusps_on_edges(
 
 def null_vectors(
     setting: Setting, at: Vertices
-) -> tuple[Float[np.ndarray, "n unknowns"], Float[np.ndarray, " n"]]:
+) -> tuple[Float[np.ndarray, "n unknowns"], ItemValues]:
     """Null vectors on folds, as displacements of unit length in the metric, and φᵀF_zz[φ, φ]."""
     structure = setting.structure
     n, root = structure.unknowns, np.sqrt(structure.mass)

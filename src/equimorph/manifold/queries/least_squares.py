@@ -9,9 +9,9 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float
 
-from equimorph.arrays import Flags, Lanes, Parameters, Some, Values
+from equimorph.arrays import Flags, Lanes, Numbers, Parameters, Some, Values
 from equimorph.columns import Columns
 from equimorph.manifold.geometry.setting import Setting
 from equimorph.manifold.geometry.tangents import cap_slopes, frames_in_embedding, split_step
@@ -128,7 +128,7 @@ class _Descent:
         self.spot, self.value[lanes] = self.spot.with_rows(lanes, new), norm
         self._release(lanes[~better], (move.fall < STALLED * value**2)[~better])
 
-    def _room(self, move: "_Move") -> tuple[Values, Int[np.ndarray, " lanes"]]:
+    def _room(self, move: "_Move") -> tuple[Values, Numbers]:
         """Share of each step at which it meets a side, and which one; ∞ if none."""
         ground = self.ground
         setting, spot, box = ground.setting, move.spot, ground.eset.box
@@ -158,9 +158,7 @@ class _Descent:
         room[rising] = -excess[rising] / rise[rising]
         return room
 
-    def _land(
-        self, lanes: Some, move: "_Move", share: Values, side: Int[np.ndarray, " lanes"]
-    ) -> Flags:
+    def _land(self, lanes: Some, move: "_Move", share: Values, side: Numbers) -> Flags:
         """Put points onto the sides that their steps meet; where that raises no norm."""
         landed, ground = np.zeros(len(lanes), bool), self.ground
         setting, d = ground.setting, len(ground.setting.free)

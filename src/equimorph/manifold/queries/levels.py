@@ -4,9 +4,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 
 from equimorph.argument_checks import check_arguments
+from equimorph.arrays import CellFlags, CellNumbers, ItemFlags, Items, VertexFlags
 from equimorph.errors import InputError
 from equimorph.manifold.complex.cuts import (
     ROUND_OFF,
@@ -91,8 +92,8 @@ class Division:
     """
 
     eset: EquilibriumSet
-    on_level: Bool[np.ndarray, " V"]
-    side: Int[np.ndarray, " C"]
+    on_level: VertexFlags
+    side: CellNumbers
     lost: int
 
 
@@ -167,7 +168,7 @@ def cell_sizes(eset: EquilibriumSet) -> Float[np.ndarray, " C"]:
 
 
 @check_arguments
-def part(eset: EquilibriumSet, cells: Bool[np.ndarray, " C"]) -> EquilibriumSet:
+def part(eset: EquilibriumSet, cells: CellFlags) -> EquilibriumSet:
     """Selected cells as a set, like the stable ones: ``eset.cell_index == 0``."""
     fabric = fabric_of(eset)
     nothing = np.zeros(len(fabric.vertices), bool)
@@ -190,23 +191,15 @@ def _cut(fabric: Fabric, function: Function) -> Cut:
     values = np.where(np.abs(values) <= ROUND_OFF * np.abs(values).max(initial=0.0), 0.0, values)
 
     def between(
-        fabric: Fabric,
-        ends: Ends,
-        mark: int,
-        index: Int[np.ndarray, " n"],
-        known: Float[np.ndarray, "n 2"],
-    ) -> tuple[Bool[np.ndarray, " n"], Vertices]:
+        fabric: Fabric, ends: Ends, mark: int, index: Items, known: Float[np.ndarray, "n 2"]
+    ) -> tuple[ItemFlags, Vertices]:
         return roots(fabric, ends, mark, index, known, lambda at, _: function(at))
 
     return cut_between(fabric, values, between, function)
 
 
 def part_of(
-    eset: EquilibriumSet,
-    fabric: Fabric,
-    cells: Bool[np.ndarray, " C"],
-    on_level: Bool[np.ndarray, " V"],
-    lost: int,
+    eset: EquilibriumSet, fabric: Fabric, cells: CellFlags, on_level: VertexFlags, lost: int
 ) -> EquilibriumSet:
     """Some cells of a fabric as a set; facets on the level lie on a constraint.
 

@@ -235,10 +235,7 @@ def distinct_states(
 
 
 def _places(
-    eset: EquilibriumSet,
-    found: SetPoints,
-    value: Float[np.ndarray, " lanes"],
-    inside: Flags,
+    eset: EquilibriumSet, found: SetPoints, value: Float[np.ndarray, " lanes"], inside: Flags
 ) -> list[Place]:
     states = States(eset.structure, found.z, found.p)
     pieces = [pieces_of(eset, state) for state in states]

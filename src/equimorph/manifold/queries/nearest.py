@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 
-from equimorph.arrays import Flags, Lanes, Parameters, Rows
+from equimorph.arrays import Flags, Items, Lanes, Pairs, Parameters, Rows, Some
 from equimorph.columns import Columns
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.manifold.geometry.exact_points import Aim, correct_points
@@ -38,7 +38,7 @@ class SetPoints(Columns):
         return len(self.z)
 
 
-def points_at_vertices(eset: EquilibriumSet, vertices: Int[np.ndarray, " n"]) -> SetPoints:
+def points_at_vertices(eset: EquilibriumSet, vertices: Items) -> SetPoints:
     """Vertices of a set, with the planes of cells around them."""
     around = eset.cells[np.isin(eset.cells, vertices).any(axis=1)]
     used, corners = np.unique(around, return_inverse=True)
@@ -48,9 +48,7 @@ def points_at_vertices(eset: EquilibriumSet, vertices: Int[np.ndarray, " n"]) ->
     return SetPoints(near.z[place], near.p[place], rows[place])
 
 
-def local_minima(
-    pairs: Int[np.ndarray, "n 2"], value: Float[np.ndarray, " V"]
-) -> Int[np.ndarray, " some"]:
+def local_minima(pairs: Pairs, value: Float[np.ndarray, " V"]) -> Some:
     """Vertices of some edges that no neighbour beats, the least first."""
     least = np.full(len(value), np.inf)
     for one, other in (pairs.T, pairs.T[::-1]):

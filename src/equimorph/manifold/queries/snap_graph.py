@@ -5,9 +5,10 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from jaxtyping import Bool, Int
+from jaxtyping import Int
 
 from equimorph.argument_checks import check_arguments
+from equimorph.arrays import Facets, ItemFlags, Items
 from equimorph.equilibria import Landing, snap_landing
 from equimorph.errors import InputError
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
@@ -43,7 +44,7 @@ class Snap:
     status: str
     vertices: Int[np.ndarray, " tried"]
     landings: tuple[Landing, ...]
-    along: Int[np.ndarray, " n"]
+    along: Items
 
     @property
     def released(self) -> tuple[float, float]:
@@ -125,7 +126,7 @@ def snap_graph(
     return SnapGraph(eset, stable, tuple(snaps))
 
 
-def stability_boundary(eset: EquilibriumSet, stratum: int) -> Int[np.ndarray, "n d"]:
+def stability_boundary(eset: EquilibriumSet, stratum: int) -> Facets:
     """Facets of the folds around a stratum, one a row."""
     whole = adjacency(eset.cells)
     d = len(eset.names)
@@ -137,13 +138,13 @@ def stability_boundary(eset: EquilibriumSet, stratum: int) -> Int[np.ndarray, "n
     return np.asarray(whole.facets[own])
 
 
-def _pieces(eset: EquilibriumSet, stratum: int) -> Iterator[Int[np.ndarray, " n"]]:
+def _pieces(eset: EquilibriumSet, stratum: int) -> Iterator[Items]:
     """Vertices of the pieces of the folds around a stable stratum, in order along curves."""
     for piece in pieces(stability_boundary(eset, stratum)):
         yield piece if len(eset.names) < 3 else np.unique(piece)
 
 
-def _facets(piece: Int[np.ndarray, "..."], d: int) -> Int[np.ndarray, "n d"]:
+def _facets(piece: Int[np.ndarray, "..."], d: int) -> Facets:
     """Facets of a piece of a fold: a point, a polyline or triangles."""
     return np.stack([piece[:-1], piece[1:]], axis=1) if d == 2 else piece.reshape(-1, d)
 
@@ -151,7 +152,7 @@ def _facets(piece: Int[np.ndarray, "..."], d: int) -> Int[np.ndarray, "n d"]:
 class _Edge:
     """A piece of the stability boundary, and what is known of the snaps from its vertices."""
 
-    def __init__(self, eset: EquilibriumSet, source: int, vertices: Int[np.ndarray, " n"]) -> None:
+    def __init__(self, eset: EquilibriumSet, source: int, vertices: Items) -> None:
         self.eset, self.source, self.vertices = eset, source, vertices
         self.known: dict[int, tuple[Landing, int]] = {}
 
@@ -213,7 +214,7 @@ class _Edge:
         at = {name: np.array([landing.state[name]]) for name in eset.names}
         here = eset.over(**at)
         gap = (here.states.z - landing.state.z)[:, : structure.unknowns] ** 2 @ structure.mass
-        near: Bool[np.ndarray, " n"] = np.sqrt(gap) < SAME_SOLUTION
+        near: ItemFlags = np.sqrt(gap) < SAME_SOLUTION
         found = here.stratum[near]
         return int(found[0]) if len(found) else NOWHERE
 

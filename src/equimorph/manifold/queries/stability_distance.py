@@ -8,7 +8,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 
 from equimorph.argument_checks import check_arguments
-from equimorph.arrays import Lanes, Parameters
+from equimorph.arrays import Facets, Items, Lanes, Parameters, Some
 from equimorph.equilibria import lift
 from equimorph.equilibria.critical import Critical, null_border
 from equimorph.errors import InputError
@@ -114,7 +114,7 @@ def _stratum_of(eset: EquilibriumSet, state: State) -> int:
 
 
 def _in_parameters(
-    eset: EquilibriumSet, state: State, boundary: Int[np.ndarray, "n d"]
+    eset: EquilibriumSet, state: State, boundary: Facets
 ) -> tuple[float, State | None]:
     """Shortest straight change to the boundary that can be lifted, and where it ends."""
     setting = eset.setting
@@ -142,9 +142,7 @@ def _in_parameters(
     return best, nearest
 
 
-def _nearest_of_each_part(
-    boundary: Int[np.ndarray, "n d"], far: Float[np.ndarray, " V"]
-) -> Int[np.ndarray, " some"]:
+def _nearest_of_each_part(boundary: Facets, far: Float[np.ndarray, " V"]) -> Some:
     """Vertices of the boundary nearer than their neighbours on it, the nearest first."""
     if boundary.shape[1] == 1:
         minima = boundary[np.argsort(far[boundary[:, 0]], kind="stable"), 0]
@@ -193,7 +191,7 @@ def _is_beside_cusp(near: State, cusp: State) -> bool:
 
 
 def _along_the_set(
-    eset: EquilibriumSet, state: State, stratum: int, boundary: Int[np.ndarray, "n d"]
+    eset: EquilibriumSet, state: State, stratum: int, boundary: Facets
 ) -> tuple[float, States]:
     """Length of the shortest curve on the set to the boundary, and states along it."""
     best: tuple[float, States] = (np.inf, state.batch)
@@ -207,9 +205,7 @@ def _along_the_set(
     return best
 
 
-def _ways(
-    eset: EquilibriumSet, state: State, stratum: int, boundary: Int[np.ndarray, "n d"]
-) -> list[SetPoints]:
+def _ways(eset: EquilibriumSet, state: State, stratum: int, boundary: Facets) -> list[SetPoints]:
     """Shortest ways over the edges of a stratum from a state to different parts of its boundary."""
     setting = eset.setting
     cells = eset.cells[eset.stratum == stratum]
@@ -242,7 +238,7 @@ def _corners_around(
     eset: EquilibriumSet,
     state: State,
     stratum: int,
-    used: Int[np.ndarray, " n"],
+    used: Items,
     place: Float[np.ndarray, "V coordinates"],
     own: Float[np.ndarray, "1 coordinates"],
 ) -> Int[np.ndarray, " corners"]:
@@ -256,7 +252,7 @@ def _corners_around(
     return np.asarray(used[[np.linalg.norm(place[used] - own, axis=1).argmin()]])
 
 
-def _from_state(eset: EquilibriumSet, state: State, path: Int[np.ndarray, " n"]) -> SetPoints:
+def _from_state(eset: EquilibriumSet, state: State, path: Items) -> SetPoints:
     """A state, and vertices after it."""
     on = points_at_vertices(eset, path)
     z, p = np.concatenate([state.z[None], on.z]), np.concatenate([state.p[None], on.p])

@@ -5,9 +5,9 @@ tongue between them, the prediction fails: then the curve is followed from one e
 """
 
 import numpy as np
-from jaxtyping import Bool, Int
+from jaxtyping import Int
 
-from equimorph.arrays import Flags, Values
+from equimorph.arrays import EdgeFlags, Flags, ItemFlags, Items, Pairs, Values
 from equimorph.equilibria.critical import Critical, Test
 from equimorph.equilibria.critical_tests import gap
 from equimorph.equilibria.locus import Locus, Spots, nearest
@@ -76,14 +76,12 @@ def settle(
     return fabric
 
 
-def _few(fabric: Fabric, todo: Bool[np.ndarray, " E"]) -> bool:
+def _few(fabric: Fabric, todo: EdgeFlags) -> bool:
     """Whether so few edges deviate that it is worth while to work around them alone."""
     return fabric.dimension == 2 and int(np.count_nonzero(todo)) * LOCAL < len(todo)
 
 
-def _settle_around(
-    fabric: Fabric, ends: Int[np.ndarray, "n 2"], tolerance: float, memory: Memory
-) -> Fabric:
+def _settle_around(fabric: Fabric, ends: Pairs, tolerance: float, memory: Memory) -> Fabric:
     """Bisect and flip around some edges until none deviates there."""
     near = np.zeros(len(fabric.vertices), bool)
     near[ends] = True
@@ -104,7 +102,7 @@ def part_sheets(fabric: Fabric, memory: Memory) -> Fabric:
     return bisect(fabric, edges, those, memory)
 
 
-def bisect(fabric: Fabric, edges: Edges, at_once: Int[np.ndarray, " n"], memory: Memory) -> Fabric:
+def bisect(fabric: Fabric, edges: Edges, at_once: Items, memory: Memory) -> Fabric:
     """Put exact vertices on edges; remember where that failed."""
     ends = edges.ends
     at_once = at_once[first_copies(fabric, ends[at_once], edges.marks[at_once])]
@@ -141,10 +139,7 @@ def bisect(fabric: Fabric, edges: Edges, at_once: Int[np.ndarray, " n"], memory:
 
 
 def _vertices_on(
-    fabric: Fabric,
-    edges: Edges,
-    wanted: Int[np.ndarray, " n"],
-    lowest: Int[np.ndarray, " E"],
+    fabric: Fabric, edges: Edges, wanted: Items, lowest: Int[np.ndarray, " E"]
 ) -> tuple[list[Int[np.ndarray, " _"]], list[Vertices], Int[np.ndarray, " m"]]:
     """Edges with vertices on them, part by part, and those on which none was found."""
     done: list[Int[np.ndarray, " _"]] = []
@@ -170,9 +165,7 @@ FARTHEST = 10.0
 """Length of a curve, relative to its edge, beyond which it is given up."""
 
 
-def on_plain_curves(
-    fabric: Fabric, edges: Int[np.ndarray, "n 2"], marks: Int[np.ndarray, " n"]
-) -> Bool[np.ndarray, " n"]:
+def on_plain_curves(fabric: Fabric, edges: Pairs, marks: Items) -> ItemFlags:
     """Which edges over two parameters lie on one fold or constraint, and no other sheet crosses."""
     plain = (fabric.vertices.kinds[edges] != CROSSING).all(axis=1)
     return np.asarray(

@@ -5,8 +5,9 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 
+from equimorph.arrays import EdgeFlags, Items, ItemValues, Pairs, VertexFlags
 from equimorph.linalg.lanes import results_of
 from equimorph.manifold.complex.edge_points import chunks
 from equimorph.manifold.complex.marked_complex import (
@@ -50,11 +51,11 @@ class Edges:
     marks: Int[np.ndarray, " E"]
     length: Float[np.ndarray, " E"]
     error: Float[np.ndarray, " E"]
-    stuck: Bool[np.ndarray, " E"]
-    pressing: Bool[np.ndarray, " E"]
-    uneven: Bool[np.ndarray, " E"]
+    stuck: EdgeFlags
+    pressing: EdgeFlags
+    uneven: EdgeFlags
 
-    def deviating(self, tolerance: float) -> Bool[np.ndarray, " E"]:
+    def deviating(self, tolerance: float) -> EdgeFlags:
         """Edges that should be bisected now, and can be.
 
         Folds and constraints come first: they bulge out between their vertices, and adjacent edges
@@ -79,9 +80,9 @@ class Edges:
 class Memory:
     """Deviations of edges that were measured before, and edges that could not be bisected."""
 
-    keys: Int[np.ndarray, " n"] = field(default_factory=lambda: np.zeros(0, int))
+    keys: Items = field(default_factory=lambda: np.zeros(0, int))
     """Of the edges whose deviation is known, in order: lower ends in the upper half of the bits."""
-    error: Float[np.ndarray, " n"] = field(default_factory=lambda: np.zeros(0))
+    error: ItemValues = field(default_factory=lambda: np.zeros(0))
     stuck: set[tuple[int, int]] = field(default_factory=set)
     cut: Int[np.ndarray, "m 2"] = field(default_factory=lambda: np.zeros((0, 2), int))
     """Edges that were bisected: flips must not bring them back."""
@@ -91,18 +92,18 @@ class Memory:
     lost: set[tuple[int, int]] = field(default_factory=set)
     """Edges on curves that do not lead from one end to the other: something is hidden there."""
 
-    def forget(self, touched: Bool[np.ndarray, " V"]) -> None:
+    def forget(self, touched: VertexFlags) -> None:
         """Forget edges between some vertices: those that now lie on a fold deviate otherwise."""
         kept = ~(touched[self.keys >> 32] & touched[self.keys & 0xFFFFFFFF])
         self.keys, self.error = self.keys[kept], self.error[kept]
 
-    def past_edges(self, fabric: Fabric) -> tuple[Int[np.ndarray, "n 2"], Int[np.ndarray, " n"]]:
+    def past_edges(self, fabric: Fabric) -> tuple[Pairs, Items]:
         """Edges that were bisected, with the vertices on them, where these are there."""
         live = np.zeros(len(fabric.vertices), bool)
         live[fabric.cells] = True
         return self.cut[live[self.put]], self.put[live[self.put]]
 
-    def among(self, inside: Bool[np.ndarray, " V"]) -> "Memory":
+    def among(self, inside: VertexFlags) -> "Memory":
         """The part of the memory for edges between flagged vertices, with all deviations."""
         stuck = {(a, b) for a, b in self.stuck if inside[a] and inside[b]}
         own = inside[self.cut].all(axis=1)
@@ -113,7 +114,7 @@ class Memory:
         """What is remembered by now."""
         return replace(self, stuck=set(self.stuck), lost=set(self.lost))
 
-    def learn(self, inner: "Memory", inside: Bool[np.ndarray, " V"]) -> None:
+    def learn(self, inner: "Memory", inside: VertexFlags) -> None:
         """Take over what was learned among flagged vertices, and those added since."""
         keys, at = np.unique(np.concatenate([inner.keys, self.keys]), return_index=True)
         self.keys, self.error = keys, np.concatenate([inner.error, self.error])[at]
@@ -153,7 +154,7 @@ def update_edges(fabric: Fabric, memory: Memory) -> Edges:
     return Edges(ends, of_cells, marks, length, error, stuck | failed, pressing, uneven)
 
 
-def near_lost(fabric: Fabric, memory: Memory) -> Bool[np.ndarray, " V"]:
+def near_lost(fabric: Fabric, memory: Memory) -> VertexFlags:
     """Vertices that are as near to edges that are lost as these are long."""
     place = fabric.vertices.place
     out = np.zeros(len(place), bool)
@@ -167,8 +168,8 @@ def _pressing(
     ends: Int[np.ndarray, "E 2"],
     marks: Int[np.ndarray, " E"],
     length: Float[np.ndarray, " E"],
-    failed: Bool[np.ndarray, " E"],
-) -> Bool[np.ndarray, " E"]:
+    failed: EdgeFlags,
+) -> EdgeFlags:
     """Longer edges on folds and constraints next to edges that could not be bisected.
 
     Those may cross a fold that bulges out between its vertices.
@@ -182,7 +183,7 @@ def _pressing(
 
 def _beside_crossings(
     fabric: Fabric, of_cells: Int[np.ndarray, "C sides"], marks: Int[np.ndarray, " E"]
-) -> tuple[Bool[np.ndarray, " E"], Bool[np.ndarray, " E"]]:
+) -> tuple[EdgeFlags, EdgeFlags]:
     """Edges on crossings opposite to a too obtuse angle, and edges much longer than neighbours.
 
     A sheet may be bent strongly across a straight crossing, and another one be flat: both share the
@@ -210,7 +211,7 @@ def deviations(
 ) -> Float[np.ndarray, " E"]:
     """How far the set is from straight edges."""
 
-    def of(own: Int[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
+    def of(own: Items) -> ItemValues:
         first, second = (fabric.end(ends[own], side, int(marks[own[0]])) for side in range(2))
         return Cubics(first, second).error
 
@@ -229,7 +230,7 @@ def deviations(
     return out
 
 
-def choose_edges(edges: Edges, tolerance: float) -> Int[np.ndarray, " n"]:
+def choose_edges(edges: Edges, tolerance: float) -> Items:
     """Edges to be bisected now, those first that cells with several are to be cut at first.
 
     Those that deviate so much that their halves may, too; of the others, those that all cells
@@ -247,9 +248,7 @@ def choose_edges(edges: Edges, tolerance: float) -> Int[np.ndarray, " n"]:
     return out[np.argsort(-weight[out], kind="stable")]
 
 
-def _close(
-    edges: Edges, wanted: Bool[np.ndarray, " E"]
-) -> tuple[Bool[np.ndarray, " E"], Float[np.ndarray, " E"]]:
+def _close(edges: Edges, wanted: EdgeFlags) -> tuple[EdgeFlags, Float[np.ndarray, " E"]]:
     """Wanted edges and what follows; and by how much cells prefer to be cut at each edge.
 
     In every cell with a chosen edge the longest edge is chosen, too, if it is longer by more than

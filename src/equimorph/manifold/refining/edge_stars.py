@@ -13,7 +13,7 @@ from itertools import combinations
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from equimorph.arrays import Cells, Edges
+from equimorph.arrays import Cells, Edges, ItemFlags, Items, ItemValues, Pairs, VertexFlags
 from equimorph.columns import Columns
 from equimorph.manifold.complex.marked_complex import (
     CURVES,
@@ -37,7 +37,7 @@ Keys = Int[np.ndarray, " keys"]
 
 
 def reconnections(
-    fabric: Fabric, quality: Float[np.ndarray, " cells"], near: Bool[np.ndarray, " V"], but: Edges
+    fabric: Fabric, quality: Float[np.ndarray, " cells"], near: VertexFlags, but: Edges
 ) -> Refills:
     """Other cells around the edges and facets of poor ones with a corner near.
 
@@ -62,7 +62,7 @@ def reconnections(
     )
 
 
-def _open_again(rings: "Rings", near: Bool[np.ndarray, " V"]) -> Bool[np.ndarray, " rings"]:
+def _open_again(rings: "Rings", near: VertexFlags) -> Bool[np.ndarray, " rings"]:
     """Which rings changed, or may be filled by a chord that was an edge elsewhere before."""
     polygons = np.concatenate([rings.first, rings.second], axis=1)
     corners = (near[polygons] & (polygons >= 0)).sum(axis=1)
@@ -156,11 +156,11 @@ class Rings(Columns):
     """
 
     ends: Edges
-    mark: Int[np.ndarray, " n"]
+    mark: Items
     cells: Int[np.ndarray, "n ring"]
     first: Int[np.ndarray, "n corners"]
     second: Int[np.ndarray, "n corners"]
-    index: Int[np.ndarray, "n 2"]
+    index: Pairs
 
     @property
     def chord(self) -> Edges:
@@ -190,14 +190,14 @@ def rings_around(fabric: Fabric, ends: Edges) -> Rings:
     return _order(fabric, ends[kept], mark[kept], count[kept], table[kept])
 
 
-def _single(mark: Int[np.ndarray, " n"]) -> Bool[np.ndarray, " n"]:
+def _single(mark: Items) -> ItemFlags:
     """Which edges lie inside, or on one surface whose facets may be exchanged."""
     allowed = (CURVES & ~FacetMark.CROSSING) | (63 * FacetMark.SIDE)
     return np.asarray((mark & (mark - 1) == 0) & (mark & ~allowed == 0))
 
 
 def _arcs(
-    fabric: Fabric, keys: Int[np.ndarray, " n"]
+    fabric: Fabric, keys: Items
 ) -> tuple[Int[np.ndarray, " a"], Int[np.ndarray, " a"], Edges]:
     """Cells around edges: the edge, the cell, and its other side, turning to the right."""
     base = len(fabric.vertices)
@@ -216,11 +216,7 @@ def _arcs(
 
 
 def _order(
-    fabric: Fabric,
-    ends: Edges,
-    mark: Int[np.ndarray, " n"],
-    count: Int[np.ndarray, " n"],
-    table: Int[np.ndarray, "n ring 3"],
+    fabric: Fabric, ends: Edges, mark: Items, count: Items, table: Int[np.ndarray, "n ring 3"]
 ) -> Rings:
     """Rings with their cells one after the other, parted where facets are marked."""
     base, rows = len(fabric.vertices), np.arange(len(ends))
@@ -261,7 +257,7 @@ def _order(
 
 
 def _polygons(
-    corners: Int[np.ndarray, "n ring"], count: Int[np.ndarray, " n"], second: Int[np.ndarray, " n"]
+    corners: Int[np.ndarray, "n ring"], count: Items, second: Items
 ) -> tuple[Int[np.ndarray, "n ring"], Int[np.ndarray, "n ring"]]:
     """Polygons up to a place and from it on, back to the beginning; one alone if it is zero."""
     two, number = (second > 0)[:, None], np.arange(corners.shape[1])
@@ -280,7 +276,7 @@ class Filling:
     the polygons, −1 beyond.
     """
 
-    quality: Float[np.ndarray, " n"]
+    quality: ItemValues
     cells: Int[np.ndarray, "n come 4"]
     chords: Int[np.ndarray, "n chords 2"]
 

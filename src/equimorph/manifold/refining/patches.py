@@ -7,8 +7,9 @@ from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
-from jaxtyping import Bool, Int
+from jaxtyping import Int
 
+from equimorph.arrays import VertexFlags
 from equimorph.manifold.complex.marked_complex import Fabric, FacetMark
 from equimorph.manifold.geometry.topology import count_corners
 
@@ -23,7 +24,7 @@ class Patch:
 
     fabric: Fabric
     rest: Fabric
-    inside: Bool[np.ndarray, " V"]
+    inside: VertexFlags
 
     def replace_by(self, by: Fabric) -> Fabric:
         """Return the whole fabric, with another one in place of the patch."""
@@ -38,7 +39,7 @@ class Patch:
         )
 
 
-def patch_around(fabric: Fabric, near: Bool[np.ndarray, " V"], rings: int) -> Patch:
+def patch_around(fabric: Fabric, near: VertexFlags, rings: int) -> Patch:
     """Triangles around flagged vertices, and `rings` further rings, of all sheets that cross.
 
     Edges on crossings that other sheets hold beyond the patch belong to its rim.
@@ -70,7 +71,7 @@ def patch_around(fabric: Fabric, near: Bool[np.ndarray, " V"], rings: int) -> Pa
     return Patch(patch, rest, near)
 
 
-def _in_all_sheets(fabric: Fabric, near: Bool[np.ndarray, " V"]) -> Bool[np.ndarray, " V"]:
+def _in_all_sheets(fabric: Fabric, near: VertexFlags) -> VertexFlags:
     """Some vertices, and those that are the same points of other sheets."""
     shared = fabric.vertices.shared
     met = np.zeros(int(shared.max(initial=-1)) + 2, bool)
@@ -80,7 +81,7 @@ def _in_all_sheets(fabric: Fabric, near: Bool[np.ndarray, " V"]) -> Bool[np.ndar
 
 
 def _pairs_between(
-    cells: Int[np.ndarray, "n corners"], chosen: Bool[np.ndarray, " V"]
+    cells: Int[np.ndarray, "n corners"], chosen: VertexFlags
 ) -> Int[np.ndarray, "m 2"]:
     """Edges of cells, sorted, both of whose ends are chosen."""
     cells = cells[count_corners(chosen, cells) > 1]

@@ -15,7 +15,7 @@ from itertools import combinations
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from equimorph.arrays import Cells
+from equimorph.arrays import CellFlags, Cells, Items, VertexFlags
 from equimorph.manifold.complex.marked_complex import (
     CURVES,
     TRIANGLES,
@@ -105,7 +105,7 @@ def qualities(vertices: Vertices, cells: Cells, index: Indices) -> Angles:
     return np.asarray(factor * smallest_angles(squared) - np.pi * turned)
 
 
-def qualities_near(fabric: Fabric, near: Bool[np.ndarray, " V"]) -> Angles:
+def qualities_near(fabric: Fabric, near: VertexFlags) -> Angles:
     """Qualities of the cells around those with a corner near; infinite for the others.
 
     Triangles are turned here where they are so on average over their corners.
@@ -229,9 +229,7 @@ def corner_angles(fabric: Fabric) -> Float[np.ndarray, "C 3"]:
     return np.asarray(np.where(bounded, total, np.inf)[sector].reshape(count, 3))
 
 
-def _corner_of(
-    fabric: Fabric, sides: Int[np.ndarray, " n"], vertices: Int[np.ndarray, " n"]
-) -> Int[np.ndarray, " n"]:
+def _corner_of(fabric: Fabric, sides: Items, vertices: Items) -> Items:
     """Number of the corner, three for each cell, of the cells of sides that a vertex is at."""
     cell = sides // 3
     return np.asarray(3 * cell + (fabric.cells[cell] == vertices[:, None]).argmax(axis=1))
@@ -249,7 +247,7 @@ def _corner_angles(fabric: Fabric) -> Float[np.ndarray, "C 3"]:
     return out
 
 
-def confined_angles(fabric: Fabric, sharp: float) -> Bool[np.ndarray, " C"]:
+def confined_angles(fabric: Fabric, sharp: float) -> CellFlags:
     """Triangles that cannot be expected to have no angle smaller than `sharp`.
 
     Those between curves that meet at less than that, from the corner on as long as all vertices lie

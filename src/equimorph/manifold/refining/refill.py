@@ -15,7 +15,7 @@ from functools import partial
 import numpy as np
 from jaxtyping import Bool, Float
 
-from equimorph.arrays import Edges
+from equimorph.arrays import Edges, VertexFlags
 from equimorph.manifold.complex.marked_complex import TETRAHEDRA, TRIANGLES, Fabric
 from equimorph.manifold.geometry.topology import among, keys_of, rows_of
 from equimorph.manifold.refining.deviation import Memory, deviations
@@ -44,7 +44,7 @@ OPPOSITE = np.array([[1, 2], [2, 0], [0, 1]])
 SHORT = 0.05
 """Ratio of the lengths of two edges of a triangle below which the shorter one counts as poor."""
 
-Near = Bool[np.ndarray, " V"]
+Near = VertexFlags
 NewNear = Bool[np.ndarray, " new_vertices"]
 NewQuality = Float[np.ndarray, " new_cells"]
 Candidates = Callable[[Fabric, Quality, Near], Refills]

@@ -3,8 +3,8 @@
 from collections.abc import Callable
 
 import numpy as np
-from jaxtyping import Bool
 
+from equimorph.arrays import CellFlags, EdgeFlags
 from equimorph.manifold.complex.marked_complex import CURVES, Fabric, FacetMark
 from equimorph.manifold.queries.cusps import with_cusps_beside
 from equimorph.manifold.refining.bisect import bisect, settle
@@ -82,13 +82,13 @@ def _best(patch: Patch, tolerance: float, memory: Memory) -> tuple[Fabric, Memor
     return best
 
 
-def _bad(fabric: Fabric) -> Bool[np.ndarray, " C"]:
+def _bad(fabric: Fabric) -> CellFlags:
     """Cells that are overturned, look backwards, or have a small angle where that can be helped."""
     over = project_against_index(fabric.vertices, fabric.cells, fabric.cell_index)
     return np.asarray(over | fabric.looks_back(fabric.cells) | _sharp(fabric))
 
 
-def _sharp(fabric: Fabric) -> Bool[np.ndarray, " C"]:
+def _sharp(fabric: Fabric) -> CellFlags:
     """Cells with a small angle, unless they lie between curves that meet at one."""
     sharp = smallest_angles(fabric.squared) < SHARP
     if not (fabric.marks & FacetMark.CROSSING).any():
@@ -130,11 +130,7 @@ def _all_cut(fabric: Fabric, tolerance: float, memory: Memory) -> Fabric:
 
 
 def _cut(
-    fabric: Fabric,
-    edges: Edges,
-    cells: Bool[np.ndarray, " C"],
-    wanted: Bool[np.ndarray, " E"],
-    memory: Memory,
+    fabric: Fabric, edges: Edges, cells: CellFlags, wanted: EdgeFlags, memory: Memory
 ) -> Fabric:
     """Bisect the required edges of cells, the longest first."""
     chosen = np.unique(edges.of_cells[cells])

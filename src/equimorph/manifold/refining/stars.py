@@ -7,7 +7,7 @@ from itertools import combinations
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from equimorph.arrays import Cells, Edges
+from equimorph.arrays import Cells, Edges, ItemFlags, Items
 from equimorph.manifold.complex.marked_complex import TRIANGLES, Fabric, squared_sides
 from equimorph.manifold.geometry.topology import among, count_corners, distinct, keys_of
 from equimorph.manifold.refining.quality import POOR, qualities, smallest_angles, worst
@@ -19,7 +19,7 @@ WORSE, MUCH_WORSE = 0.7, 0.2
 LONGER = 1.5
 """Largest ratio of the longest sides of the cells after and before."""
 
-Rows = Int[np.ndarray, " n"]
+Rows = Items
 """Numbers of refills, vertices or cells."""
 Pairs = tuple[Int[np.ndarray, " pairs"], Int[np.ndarray, " pairs"]]
 """Two numbers for each pair of things that belong together."""
@@ -185,7 +185,7 @@ class Refills:
         np.bitwise_or.at(out, at[wanted[at] == have], marks[wanted[at] == have])
         return out
 
-    def vanishes(self, row: Rows, vertex: Rows) -> Bool[np.ndarray, " n"]:
+    def vanishes(self, row: Rows, vertex: Rows) -> ItemFlags:
         """Whether vertices lose all their cells by a refill each."""
         base = len(self.fabric.vertices)
         wanted = row * base + vertex

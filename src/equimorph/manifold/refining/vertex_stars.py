@@ -11,7 +11,7 @@ from itertools import combinations, product
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from equimorph.arrays import Edges
+from equimorph.arrays import Edges, ItemFlags, Places, VertexFlags
 from equimorph.manifold.complex.edge_points import chunks, of_index, on_curves, vertices_at
 from equimorph.manifold.complex.marked_complex import (
     TRIANGLES,
@@ -54,7 +54,7 @@ TO_FRONT = {
 }
 """Even permutations that bring each corner of a cell to the front, by the dimension."""
 
-Near = Bool[np.ndarray, " V"]
+Near = VertexFlags
 Directions = Float[np.ndarray, "n k d"]
 
 
@@ -216,7 +216,7 @@ def moves(fabric: Fabric, quality: Quality, near: Near, sharp: float = SHARP) ->
 
 def _at_better_places(
     fabric: Fabric, around: Around, chosen: Rows, mark: int
-) -> tuple[Bool[np.ndarray, " n"], Vertices]:
+) -> tuple[ItemFlags, Vertices]:
     """Vertices with a mark after their moves, and for which of them these were found.
 
     The place is searched for in the tangent space and corrected orthogonally to it.
@@ -283,7 +283,7 @@ def _stars(fabric: Fabric, around: Around, chosen: Rows, directions: Directions)
 
 
 def _with_side(
-    sides: Float[np.ndarray, "n d d"], number: int, side: Float[np.ndarray, "n d"]
+    sides: Float[np.ndarray, "n d d"], number: int, side: Places
 ) -> Float[np.ndarray, "n d d"]:
     """Sides with another one in place of one of them."""
     out = sides.copy()
