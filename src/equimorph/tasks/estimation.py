@@ -14,11 +14,12 @@ from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.geometry.tangents import fold_slopes, split_step
 from equimorph.manifold.geometry.topology import faces_of
-from equimorph.manifold.queries.least_squares import DIFFERENCE, Residuals, nearest
+from equimorph.manifold.queries.least_squares import Residuals, nearest
 from equimorph.manifold.queries.locate import ValueFit, distinct_states, pieces_of
 from equimorph.manifold.queries.nearest import Ground, SetPoints, local_minima, points_at_vertices
 from equimorph.model import Descriptor
 from equimorph.structures import State, States, shape_coordinate
+from equimorph.tolerances import METRIC_DIFFERENCE
 
 STARTS = 16
 """Local minima over the vertices from which the best fits are searched."""
@@ -315,9 +316,9 @@ def _standard_errors(
     frames, _ = Ground(setting, eset).frames(spot)
     columns = []
     for k in range(frames.shape[1]):
-        dz, dp = split_step(setting, DIFFERENCE * frames[:, k])
+        dz, dp = split_step(setting, METRIC_DIFFERENCE * frames[:, k])
         ahead, behind = (residuals(spot.z + s * dz, spot.p + s * dp) for s in (1.0, -1.0))
-        columns.append((ahead - behind) / (2.0 * DIFFERENCE))
+        columns.append((ahead - behind) / (2.0 * METRIC_DIFFERENCE))
     slope = np.stack(columns, axis=2)
     values, vectors = np.linalg.eigh(np.swapaxes(slope, 1, 2) @ slope)
     moves = frames[:, :, frames.shape[2] - d :] * setting.scales
