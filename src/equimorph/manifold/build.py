@@ -18,10 +18,17 @@ from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.manifold.complex.kept_sets import Effort, question_of_set, recall_set
 from equimorph.manifold.geometry.setting import Setting
 from equimorph.manifold.lifting.cells import CellFinder, Cells, account
-from equimorph.manifold.lifting.completeness import check, longest, off_zero, recover
+from equimorph.manifold.lifting.completeness import Check, check, recover
 from equimorph.manifold.lifting.crossing_branches import flood_crossings
 from equimorph.manifold.lifting.flood import flood
-from equimorph.manifold.lifting.grid import Lines, bisect, coarse_grid, grid_lines, grid_mesh
+from equimorph.manifold.lifting.grid import (
+    Lines,
+    bisect,
+    coarse_grid,
+    grid_lines,
+    grid_mesh,
+    longest_edges,
+)
 from equimorph.manifold.lifting.pairing import Pairing, start_pairing
 from equimorph.manifold.lifting.seeds import Seeds, is_symmetric, seeds
 from equimorph.manifold.lifting.unseen import UnseenFinder
@@ -181,26 +188,15 @@ def _of_grid(
     progress: Progress,
 ) -> EquilibriumSet:
     """Lift a set over one grid, and what the completeness checks find that it lacks."""
-    lines = grid_lines(box, intervals, off_zero(setting))
+    lines = grid_lines(box, intervals)
     progress.report("seeds", 0, 1)
     pairing = start_pairing(setting, grid_mesh(lines), effort.limit)
     pairing.points.over_vertices(*_spread(pairing, lines, effort.seed, progress))
     generator = np.random.default_rng([effort.seed, 1])
+    lifting = _Lifting(pairing, box, fixed, intervals, progress)
     recovered = 0
-    finder, unseen = CellFinder(), UnseenFinder()
-
-    def lift() -> tuple[Cells, EquilibriumSet]:
-        cells, bisected = _lift_grid(pairing, finder, unseen, progress)
-        frame = Frame(setting, pairing.mesh, box, fixed, intervals)
-        return cells, account(pairing, cells, frame, bisected)
-
     for number in range(SEARCHES):
-        pairing.fit()
-        cells, eset = lift()
-        for _ in range(MENDED):
-            if not _divide_wrong(pairing, eset):
-                break
-            cells, eset = lift()
+        cells, eset = lifting.upright()
         found = check(eset, generator, _checks(effort.checks, setting), progress)
         lacking = len(found.missing)
         # what stays undecided in spite of bisection is not mended by more equilibria
@@ -210,20 +206,53 @@ def _of_grid(
         recovered += lacking
         some = np.unique(np.linspace(0, lacking - 1, RECOVERED).astype(int))
         recover(pairing, found.missing[some])
-    stopped = pairing.points.count if pairing.is_full else 0
-    audit = replace(
-        eset.audit,
-        checked=found.found,
-        missing=lacking,
-        recovered=recovered,
-        descents=found.descents,
-        left_out=found.left_out,
-        on_lines=found.on_lines,
-        stopped=stopped,
-        cell_size=_cell_size(box, intervals),
-        touching=tuple(_named(box, place) for place in cells.touching),
-    )
-    return replace(eset, audit=audit)
+    return lifting.with_checks(cells, eset, found, recovered)
+
+
+class _Lifting:
+    """A grid that is being lifted, with what has been seen of its cells."""
+
+    def __init__(
+        self, pairing: Pairing, box: Box, fixed: Mapping[str, float], intervals: tuple[int, ...],
+        progress: Progress,
+    ) -> None:  # fmt: skip
+        self.pairing, self.box, self.intervals, self.progress = pairing, box, intervals, progress
+        self.fixed, self.finder, self.unseen = fixed, CellFinder(), UnseenFinder()
+
+    def upright(self) -> tuple[Cells, EquilibriumSet]:
+        """Cells and set; grid cells below those of a wrong sense are bisected and lifted again."""
+        self.pairing.fit()
+        cells, eset = self._lift()
+        for _ in range(MENDED):
+            if not _divide_wrong(self.pairing, eset):
+                break
+            cells, eset = self._lift()
+        return cells, eset
+
+    def _lift(self) -> tuple[Cells, EquilibriumSet]:
+        cells, bisected = _lift_grid(self.pairing, self.finder, self.unseen, self.progress)
+        mesh, setting = self.pairing.mesh, self.pairing.setting
+        frame = Frame(setting, mesh, self.box, self.fixed, self.intervals)
+        return cells, account(self.pairing, cells, frame, bisected)
+
+    def with_checks(
+        self, cells: Cells, eset: EquilibriumSet, found: Check, recovered: int
+    ) -> EquilibriumSet:
+        """The set with what the checks found in its audit."""
+        box, full = self.box, self.pairing.is_full
+        audit = replace(
+            eset.audit,
+            checked=found.found,
+            missing=len(found.missing),
+            recovered=recovered,
+            descents=found.descents,
+            left_out=found.left_out,
+            on_lines=found.on_lines,
+            stopped=self.pairing.points.count if full else 0,
+            cell_size=_named(box, (box.upper - box.lower) / np.array(self.intervals)),
+            touching=tuple(_named(box, place) for place in cells.touching),
+        )
+        return replace(eset, audit=audit)
 
 
 def _divide_wrong(pairing: Pairing, eset: EquilibriumSet) -> bool:
@@ -237,14 +266,9 @@ def _divide_wrong(pairing: Pairing, eset: EquilibriumSet) -> bool:
     middle = eset.coordinates[eset.cells[wrong_cells(eset)]].mean(axis=1)
     around = np.unique([mesh.locate(place) for place in middle])
     sides = mesh.sides[around] if mesh.dimension == 2 else mesh.sides[mesh.faces[around]]
-    chosen = np.unique(longest(mesh, sides.reshape(len(around), -1)))
-    pairing.use_mesh(bisect(mesh, chosen, off_zero(pairing.setting)))
+    chosen = longest_edges(mesh, sides.reshape(len(around), -1))
+    pairing.use_mesh(bisect(mesh, chosen))
     return True
-
-
-def _cell_size(box: Box, intervals: tuple[int, ...]) -> tuple[tuple[str, float], ...]:
-    """Widths of the cells of the grid by parameter."""
-    return _named(box, (box.upper - box.lower) / np.array(intervals))
 
 
 def _named(box: Box, values: Place) -> tuple[tuple[str, float], ...]:
@@ -333,7 +357,7 @@ def _lift_grid(
         chosen, exits = _longest_edges(pairing, cells), unseen.exits
         # first those through which tongues leave their cells
         chosen = np.concatenate([np.array(list(exits), int), np.setdiff1d(chosen, list(exits))])
-        pairing.use_mesh(bisect(pairing.mesh, chosen, off_zero(pairing.setting), exits))
+        pairing.use_mesh(bisect(pairing.mesh, chosen, exits))
     return cells, bisected
 
 
@@ -373,4 +397,4 @@ def _longest_edges(pairing: Pairing, cells: Cells) -> Items:
         mesh.sides[cells.doubtful_triangles],
         mesh.sides[around].reshape(len(around), 12),
     ]
-    return np.unique(np.concatenate([longest(mesh, sides) for sides in groups]))
+    return np.unique(np.concatenate([longest_edges(mesh, sides) for sides in groups]))

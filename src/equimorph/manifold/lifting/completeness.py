@@ -18,7 +18,7 @@ from equimorph.manifold.complex.base_mesh import BaseMesh
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.manifold.geometry.setting import Setting
 from equimorph.manifold.lifting.descents_of_set import descents_of_set, spread_over_strata
-from equimorph.manifold.lifting.grid import bisect
+from equimorph.manifold.lifting.grid import bisect, longest_edges
 from equimorph.manifold.lifting.pairing import Pairing
 from equimorph.manifold.lifting.seeds import Seeds, polish
 from equimorph.manifold.lookup.exact_states import lift_to
@@ -208,21 +208,6 @@ def recover(pairing: Pairing, missing: States) -> None:
             return
         around = np.unique([mesh.locate(point) for point in missing.p[:, pairing.setting.free]])
         sides = mesh.sides[around] if mesh.dimension == 2 else mesh.sides[mesh.faces[around]]
-        chosen = longest(mesh, sides.reshape(len(around), -1))
+        chosen = longest_edges(mesh, sides.reshape(len(around), -1))
         pairing.fit()
-        pairing.use_mesh(bisect(mesh, np.unique(chosen), off_zero(pairing.setting)))
-
-
-def off_zero(setting: Setting) -> tuple[bool, ...]:
-    """Tell of which free parameters zero no line of the grid may hold: all.
-
-    There much is symmetric, declared or not: a structure whose load is none may be its own image.
-    """
-    return (True,) * len(setting.free)
-
-
-def longest(mesh: BaseMesh, sides: Int[np.ndarray, "n sides"]) -> Int[np.ndarray, " n"]:
-    """Return the longest edge of each row, relative to the box."""
-    ends = mesh.vertices[mesh.edges[sides]] / np.ptp(mesh.vertices, axis=0)
-    length = np.linalg.norm(ends[:, :, 0] - ends[:, :, 1], axis=2)
-    return np.asarray(sides[np.arange(len(sides)), length.argmax(axis=1)])
+        pairing.use_mesh(bisect(mesh, chosen))

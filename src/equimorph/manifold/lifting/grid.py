@@ -8,9 +8,9 @@ from dataclasses import dataclass, field, replace
 from itertools import permutations
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 
-from equimorph.arrays import Place, Some
+from equimorph.arrays import Items, Place, Some
 from equimorph.manifold.complex.base_mesh import BaseMesh, mesh_of
 from equimorph.model import Box
 
@@ -18,7 +18,8 @@ SHIFT = 0.02
 """Largest shift of a grid line off its regular place, in intervals."""
 
 APART = 0.15
-"""Shift of the inner lines of a parameter with the same lines as another one, in intervals."""
+"""Shift, in intervals, of a line on which a parameter is zero, and of the inner lines of a
+parameter with the same lines as another one."""
 
 ASIDE = 0.1
 """Part of an edge by which the point that splits it is moved off a line of symmetry."""
@@ -30,7 +31,7 @@ Lines = tuple[Float[np.ndarray, " _"], ...]
 """Places of grid lines along each free parameter."""
 
 
-def _lines(low: float, high: float, count: int, mirrored: bool) -> Float[np.ndarray, " lines"]:
+def _lines(low: float, high: float, count: int) -> Float[np.ndarray, " lines"]:
     """Grid lines, equidistant but for a slight shift; one on a line of symmetry is moved off it.
 
     Round numbers put vertices exactly on folds more often than chance would: the shift, an odd
@@ -40,18 +41,16 @@ def _lines(low: float, high: float, count: int, mirrored: bool) -> Float[np.ndar
     lines = np.linspace(low, high, count + 1)
     spacing = (high - low) / count
     lines[1:-1] += SHIFT * spacing * np.sin(lines[1:-1] / spacing)
-    if mirrored:
-        on = np.flatnonzero(np.abs(lines) < 1e-9 * (high - low))
-        inside = on[(on > 0) & (on < count)]
-        lines[inside] += 0.15 * spacing
+    on = np.flatnonzero(np.abs(lines) < 1e-9 * (high - low))
+    lines[on[(on > 0) & (on < count)]] += APART * spacing
     return lines
 
 
-def grid_lines(box: Box, intervals: tuple[int, ...], mirrored: tuple[bool, ...]) -> Lines:
+def grid_lines(box: Box, intervals: tuple[int, ...]) -> Lines:
     """Places of the grid lines along each free parameter."""
     lines: list[Float[np.ndarray, " _"]] = []
     for k, count in enumerate(intervals):
-        line = _lines(box.lower[k], box.upper[k], count, mirrored[k])
+        line = _lines(box.lower[k], box.upper[k], count)
         if any(np.array_equal(line, other) for other in lines):
             # else diagonals lie on the line where both parameters are equal, often a singular one
             line[1:-1] += APART * (line[-1] - line[0]) / count * np.sign(line[1:-1])
@@ -104,7 +103,6 @@ def coarse_grid(
 def bisect(
     mesh: BaseMesh,
     chosen: Some,
-    mirrored: tuple[bool, ...],
     shares: Mapping[int, float] | None = None,
 ) -> BaseMesh:
     """Split edges at their midpoints, and the triangles and tetrahedra around them.
@@ -124,7 +122,7 @@ def bisect(
             continue
         touched[cells] = True
         a, b = mesh.vertices[mesh.edges[edge]]
-        middle = _between(a, b, (shares or {}).get(edge, 0.5), mirrored)
+        middle = _between(a, b, (shares or {}).get(edge, 0.5))
         _split(growth, mesh, edge, middle, (by_triangle[edge], by_tetrahedron[edge]))
     return growth.mesh(mesh)
 
@@ -243,9 +241,15 @@ def _side_between(mesh: BaseMesh, triangle: int, pair: tuple[int, int]) -> int:
     return next(side for side in sides if set(mesh.edges[side].tolist()) == set(pair))
 
 
-def _between(a: Place, b: Place, share: float, mirrored: tuple[bool, ...]) -> Place:
+def _between(a: Place, b: Place, share: float) -> Place:
     """Point of an edge, or one next to it if it lies on a line of symmetry."""
     place = a + share * (b - a)
-    on_line: Bool[np.ndarray, " d"] = np.array(mirrored)
-    on_line = on_line & (np.abs(place) < 1e-9 * np.abs(b - a).max())
+    on_line = np.abs(place) < 1e-9 * np.abs(b - a).max()
     return np.asarray(a + (share - ASIDE) * (b - a) if on_line.any() else place)
+
+
+def longest_edges(mesh: BaseMesh, sides: Int[np.ndarray, "n sides"]) -> Items:
+    """Return the longest edge, relative to the box, of each row, each once."""
+    ends = mesh.vertices[mesh.edges[sides]] / np.ptp(mesh.vertices, axis=0)
+    length = np.linalg.norm(ends[:, :, 0] - ends[:, :, 1], axis=2)
+    return np.unique(sides[np.arange(len(sides)), length.argmax(axis=1)])
