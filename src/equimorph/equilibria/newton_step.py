@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from equimorph.arrays import Flags, Lanes, Numbers, Parameters, Values
+from equimorph.arrays import Flags, Lanes, Numbers, Parameters, Some, Values
 from equimorph.columns import Columns
 from equimorph.equilibria.critical import Critical, null_border
 from equimorph.equilibria.newton_kernels import (
@@ -13,7 +13,7 @@ from equimorph.equilibria.newton_kernels import (
     move_lanes,
     null_lanes,
 )
-from equimorph.equilibria.point_conditions import Condition, Directions, Linear, Move, Some
+from equimorph.equilibria.point_conditions import Condition, Directions, Linear, Move
 from equimorph.linalg import orthonormal_rows
 from equimorph.structures import Equations, LinearSystem, Structure
 

@@ -15,12 +15,11 @@ from enum import IntEnum
 import numpy as np
 from jaxtyping import Float, Int
 
-from equimorph.arrays import Flags, Lanes, Parameters, Rows, Values
+from equimorph.arrays import Flags, Lanes, Numbers, Parameters, Rows, Some, Values
 from equimorph.equilibria.newton_kernels import judge_lanes
 from equimorph.equilibria.newton_step import (
     Frame,
     Held,
-    Numbers,
     Planes,
     Points,
     Problem,
@@ -31,7 +30,7 @@ from equimorph.equilibria.newton_step import (
     start_at,
     weights_of,
 )
-from equimorph.equilibria.point_conditions import Condition, Directions, Some
+from equimorph.equilibria.point_conditions import Condition, Directions
 from equimorph.model import Constraint
 from equimorph.structures import Equations, Structure, newton_kernels
 from equimorph.structures.newton import Limits, Newton, Through, newton
