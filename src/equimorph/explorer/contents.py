@@ -18,7 +18,7 @@ from equimorph.explorer.packing import quantise
 from equimorph.explorer.pictures import gallery
 from equimorph.explorer.study_text import study_text
 from equimorph.manifold import EquilibriumSet, SnapGraph
-from equimorph.model import Descriptor, Disc, Obstacle
+from equimorph.model import Constraint, Descriptor, Disc, Obstacle
 from equimorph.plotting.curves import corner_steps, snap_steps
 from equimorph.plotting.support_symbols import AWAY, SYMBOLS, UPRIGHT
 from equimorph.structures import States, effort_of, margin_of
@@ -70,7 +70,7 @@ def contents(asked: Question) -> tuple[dict[str, Any], Arrays]:
         "vertices": len(eset.points),
         "parameters": _parameters(eset),
         "fixed": _fixed(eset),
-        "constraints": [str(each) for each in eset.constraints],
+        "constraints": [_bound(each) for each in eset.constraints],
         "obstacles": [_obstacle(each.descriptor.obstacle) for each in eset.constraints
                       if each.descriptor.obstacle is not None],
         "scalars": scalars,
@@ -266,6 +266,12 @@ def _barriers(reduction: Reduction, extra: _States) -> list[dict[str, Any]]:
         for each in reduction.barriers
         if len(each.near) and len(each.near) == len(each.far)
     ]  # fmt: skip
+
+
+def _bound(constraint: Constraint) -> str:
+    """A constraint with the unit of its bound."""
+    unit = constraint.descriptor.unit
+    return str(constraint) if unit in ("", "1") else f"{constraint} {unit}"
 
 
 def _obstacle(obstacle: Obstacle | None) -> dict[str, Any]:

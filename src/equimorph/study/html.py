@@ -91,6 +91,15 @@ def found_line(words: str) -> str:
     return f"<p{kind}>{text}</p>"
 
 
+def embedded(file: str, caption: str) -> str:
+    """Return a frame with another page of the folder, and a link to it."""
+    words = escape(caption)
+    return (
+        f'<p><a href="{file}">{words}</a>, in a window of its own.</p>\n'
+        f'<iframe class="page" src="{file}" title="{words}"></iframe>'
+    )
+
+
 def refusal_line(why: str) -> str:
     """Return the line of an answer without a result, with the reason."""
     return f'<p class="verdict refused"><strong>Refused.</strong> {escape(why)}</p>'

@@ -3,6 +3,7 @@
 INPUT_COPY = "study.toml"
 RESULTS = "results.h5"
 REPORT = "index.html"
+EXPLORER = "explorer.html"
 
 SURFACE = "surface"
 DIAGRAM = "diagram"

@@ -9,14 +9,25 @@ import numpy as np
 from jaxtyping import Int
 
 from equimorph import plotting
-from equimorph.manifold import EquilibriumSet
+from equimorph.explorer import explore
+from equimorph.manifold import EquilibriumSet, SnapGraph
 from equimorph.model import Descriptor, Progress
 from equimorph.structures import States
 from equimorph.study import html
 from equimorph.study.folder import ResultsFolder
-from equimorph.study.names import DIAGRAM, PLANE, STABLE_PLANE, SURFACE
+from equimorph.study.names import (
+    DIAGRAM,
+    EXPLORER,
+    PLANE,
+    STABLE_PLANE,
+    SURFACE,
+    route_name,
+)
 from equimorph.study.prepare import Outcome, Problem
 from equimorph.study.question import Figure, pictures, still
+
+ON_THE_SET = "The equilibrium set, to turn and to walk on"
+"""Words of the page that shows it."""
 
 
 def draw_figures(outcome: Outcome, folder: ResultsFolder, progress: Progress) -> None:
@@ -42,10 +53,36 @@ def draw_figures(outcome: Outcome, folder: ResultsFolder, progress: Progress) ->
 
 def _figures(outcome: Outcome) -> list[Figure]:
     eset = outcome.equilibrium_set
-    figures = [] if eset is None else _figures_of_set(outcome, eset)
+    figures = [] if eset is None else [*_explorer(outcome, eset), *_figures_of_set(outcome, eset)]
     for each in outcome.answers:
         figures += each.question.kind.figures(each.question, eset, each.answer)
     return figures
+
+
+def _explorer(outcome: Outcome, eset: EquilibriumSet) -> list[Figure]:
+    """Page on which the set can be walked on, with all routes; none of an empty set."""
+    if not len(eset.cells):
+        return []
+    routes = {
+        route_name(name, k): route
+        for name, found in outcome.of("route").items()
+        for k, route in enumerate(found, 1)
+    }
+    known = next(iter(outcome.of("snap_graph").values()), None)
+    reduction = next(iter(outcome.of("reduction").values()), None)
+
+    def draw(folder: Path) -> None:
+        explore(
+            eset,
+            routes,
+            folder / EXPLORER,
+            title=outcome.study.title,
+            descriptors=_shown_descriptors(outcome.problem),
+            reduction=reduction,
+            snaps=None if known is None else SnapGraph(eset, *known[:2]),
+        )
+
+    return [Figure((EXPLORER,), draw, ON_THE_SET)]
 
 
 def _figures_of_set(outcome: Outcome, eset: EquilibriumSet) -> list[Figure]:
@@ -89,6 +126,8 @@ def report(outcome: Outcome, folder: Path, text: str, title: str) -> str:
         Heading.
     """
     body = [f"<h1>{escape(title)}</h1>", _question(outcome.problem)]
+    if (folder / EXPLORER).exists():
+        body.append(html.embedded(EXPLORER, ON_THE_SET))
     for each in outcome.answers:
         body += each.question.kind.report(
             each.question, outcome.equilibrium_set, each.answer, folder
