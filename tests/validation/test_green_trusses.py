@@ -57,6 +57,16 @@ def test_random_forces_find_what_lines_of_the_load_do_not_reach(seed):
     assert (len(found), len(found.stable)) == (27, 8)
 
 
+def test_many_states_over_a_point_are_pushed_too():
+    """73 real roots (below); where more than 60 states were not pushed one was missing."""
+    generator = np.random.default_rng(7)
+    truss = [random_green_truss(7, generator) for _ in range(5)][4].truss
+    with unchecked():
+        found = em.find_equilibria(truss, {"F": 1.0})
+    assert (len(found), len(found.stable)) == (73, 14)
+    assert {each.standing for each in found.arguments} == {"holds"}
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("unknowns", "first", "end"),

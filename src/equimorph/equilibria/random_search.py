@@ -27,7 +27,7 @@ REACH = 4.0
 """Length of a line to each side, in scaled parameters."""
 ROUNDS = 8
 """Times that lines are laid through newly found equilibria, at most."""
-PUSHED = 60
+PUSHED = 120
 """Most states over a point that are pushed: with more, what they lead to takes most of the time."""
 HOMOTOPIES = 0.05
 """Share of the guesses from which Newton homotopy starts (where Newton found nothing)."""

@@ -190,7 +190,7 @@ def find_equilibria(
     new, and saddles are searched between minima that no chain of saddles joins: so no stable state
     is missing unless every state of index one next to it is missing as well. Against that, states
     are pushed both ways by random forces on all unknowns, until the forces vanish; over points with
-    more than 60 known states pushes are left out, and many others may be missing. New states serve
+    more than 120 known states pushes are left out, and many others may be missing. New states serve
     lines again. Where the energy is known to grow at infinity the sum of (−1)^index must be 1, else
     deflation searches once more. `FoundStates.arguments` records the outcome.
 
