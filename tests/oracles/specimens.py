@@ -155,7 +155,7 @@ def tripod():
 
 
 def _truss_lagrangian(truss):
-    bars, places = truss.network.bars, truss.network.places
+    bars, places = truss.network.members, truss.network.places
     joints = list(truss.network.joints)
     names = [parameter.name for parameter in truss.parameters]
     data = truss.identity()

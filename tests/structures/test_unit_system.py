@@ -201,7 +201,7 @@ def test_a_study_may_name_units():
     box = { a = [-1.0, 1.0], F = [0.0, 1.0] }
     """
     made = build_structure(parse_study(text, "units.toml").structure)
-    assert made.network.bars[0].EA == made.network.bars[1].EA == 2100.0
+    assert made.network.members[0].EA == made.network.members[1].EA == 2100.0
     assert made.network.places[0, 0] == -1000.0
 
 

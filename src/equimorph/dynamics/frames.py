@@ -60,7 +60,7 @@ def _supports(model: FrameModel) -> Supports:
     places[..., :-1] = patterns.moves.transpose(1, 2, 0)
     places[..., -1] = made.places / model.length
     turns = np.zeros((nodes, count))
-    turns[:, :-1] = patterns.turns.T
+    turns[:, :-1] = patterns.turns[..., 0].T
     stiff = model.supports
     return Supports(
         np.tile(np.eye(2), (nodes, 1, 1)), stiff[:, :2], places, stiff[:, 2], turns, made.rigid
@@ -84,7 +84,7 @@ def _bends(model: FrameModel, links: int) -> Bends:
         angles = 3 * nodes + m * links + np.arange(links)
         size = model.lengths[m] / links
         natural = np.zeros(count)
-        natural[:-1] = model.patterns.curvature[:, m]
+        natural[:-1] = model.patterns.strains[:, m, 0]
         natural[-1] = float(made.members[m].curvature) * model.length
         rigid = model.rigidity[m] / size
         for left, right in pairwise(angles.tolist()):

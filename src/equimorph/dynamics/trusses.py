@@ -91,7 +91,7 @@ class TrussPlant(DirectPlant):
     @property
     def speed(self) -> float:
         """Largest rate of a displacement, relative to the mean length of the bars."""
-        size = float(self._truss.network.rests.mean())
+        size = float(self._truss.network.lengths.mean())
         return float(np.abs(self._data.qvel).max()) / size
 
 

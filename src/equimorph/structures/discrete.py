@@ -11,10 +11,10 @@ from jaxtyping import Float
 from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Entries, Flags, Lanes, Parameters, Values
 from equimorph.errors import InputError
-from equimorph.linalg import Border, BorderedSolution
+from equimorph.linalg.lanes import over_lanes
 from equimorph.linalg.sparse import SparseLayout
 from equimorph.structures.contract import Structure
-from equimorph.structures.equations import Advance, JointEquations
+from equimorph.structures.equations import Advance, JointEquations, Solver
 from equimorph.structures.newton import Limits, newton
 from equimorph.structures.states import State, natural_state
 
@@ -71,8 +71,8 @@ NEAR = 0.1
 class DiscreteStructure(JointEquations, Structure):
     """Structure with a sparse KKT matrix and a natural state known at the default parameters.
 
-    Subclasses give `layout`, `entries`, `linearised` and `natural_guess`, and the rest of the
-    contract.
+    Subclasses give `layout`, `linearised` (F, F_p·dp and the entries of F_z in the order of the
+    layout) and `natural_guess`, and the rest of the contract.
     """
 
     @property
@@ -81,30 +81,22 @@ class DiscreteStructure(JointEquations, Structure):
         """Sparsity of F_z."""
 
     @abstractmethod
-    def entries(self, z: Lanes, p: Parameters) -> Entries:
-        """Entries of F_z in the order of `layout`."""
-
-    @abstractmethod
-    def linearised(self, z: Lanes, p: Parameters, dp: Parameters) -> tuple[Lanes, Lanes, Entries]:
-        """F, F_p·dp and the entries of F_z."""
-
-    @abstractmethod
     def natural_guess(self, p: Parameters) -> Lanes:
         """Natural states with all loads at zero, exact at the default parameters at least."""
 
-    def solve(
-        self,
-        z: Lanes,
-        p: Parameters,
-        rhs: Float[np.ndarray, "lanes sides bordered"],
-        border: Border | None = None,
-        shift: Values | None = None,
-    ) -> BorderedSolution:
-        """Solve with the KKT matrix F_z − shift·mass, bordered, by sparse LDLᵀ."""
-        entries = self.entries(z, p)
+    def entries(self, z: Lanes, p: Parameters) -> Entries:
+        """Entries of F_z in the order of `layout`."""
+        return self.parts(z, p)[0]
+
+    def solver(
+        self, parts: tuple[np.ndarray, ...], z: Lanes, p: Parameters, shift: Values | None = None
+    ) -> Solver:
+        """Solves with F_z − shift·mass by sparse LDLᵀ."""
+        entries = parts[0]
         if shift is not None:
+            entries = entries.copy()
             entries[:, self.layout.diagonal[: self.unknowns]] -= shift[:, None] * self.mass
-        return self.layout.solve(entries, border, rhs)
+        return lambda rhs, border: self.layout.solve(entries, border, rhs)
 
     def advance(
         self, z: Lanes, p: Parameters, dp: Parameters, row: Lanes, corner: Values, defect: Values
@@ -118,18 +110,6 @@ class DiscreteStructure(JointEquations, Structure):
             return parts[0]
         names = [field.name for field in fields(Advance)]
         return Advance(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
-
-    def solve_with(
-        self,
-        parts: tuple[np.ndarray, ...],
-        z: Lanes,
-        p: Parameters,
-        rhs: Float[np.ndarray, "lanes sides bordered"],
-        border: Border | None,
-    ) -> BorderedSolution:
-        """Solve with F_z, given by its entries, bordered."""
-        del z, p
-        return self.layout.solve(parts[0], border, rhs)
 
     # --- the natural state ----------------------------------------------------------------------
 
@@ -187,6 +167,22 @@ class DiscreteStructure(JointEquations, Structure):
             continuation from the default parameters does not converge.
         """
         return natural_state(self, **values)
+
+
+def linearise(
+    kernel: Callable[..., None],
+    shared: tuple[object, ...],
+    layout: SparseLayout,
+    given: Sequence[np.ndarray],
+) -> tuple[Lanes, Lanes, Entries]:
+    """F, F_p·dp and the entries of F_z by a compiled kernel; the first array given is z."""
+    z = np.ascontiguousarray(given[0])
+    residual, column = np.empty_like(z), np.empty_like(z)
+    entries = np.empty((len(z), len(layout.rows)))
+    if len(z):
+        inputs = [z, *(np.ascontiguousarray(array) for array in given[1:])]
+        over_lanes(kernel, shared, inputs, [residual, column, entries])
+    return residual, column, entries
 
 
 def along_corners(

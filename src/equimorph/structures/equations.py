@@ -143,28 +143,45 @@ class JointEquations(Equations):
     def linearised(self, z: Lanes, p: Parameters, dp: Parameters) -> tuple[np.ndarray, ...]:
         """F, F_p·dp and the parts of F_z."""
 
+    def parts(self, z: Lanes, p: Parameters) -> tuple[np.ndarray, ...]:
+        """The parts of F_z."""
+        return self.linearised(z, p, np.zeros_like(p))[2:]
+
     @abstractmethod
-    def solve_with(
+    def solver(
+        self, parts: tuple[np.ndarray, ...], z: Lanes, p: Parameters, shift: Values | None = None
+    ) -> Solver:
+        """Solves with F_z − shift·mass, given by the parts of F_z."""
+
+    def residual(self, z: Lanes, p: Parameters) -> Lanes:
+        """F(z; p)."""
+        return self.linearised(z, p, np.zeros_like(p))[0]
+
+    def parameter_derivative(self, z: Lanes, p: Parameters, dp: Parameters) -> Lanes:
+        """F_p·dp."""
+        return self.linearised(z, p, dp)[1]
+
+    def solve(
         self,
-        parts: tuple[np.ndarray, ...],
         z: Lanes,
         p: Parameters,
         rhs: Float[np.ndarray, "lanes sides bordered"],
-        border: Border | None,
+        border: Border | None = None,
+        shift: Values | None = None,
     ) -> BorderedSolution:
-        """Solve with F_z, given by its parts, bordered."""
+        """Solve with F_z − shift·mass, bordered."""
+        return self.solver(self.parts(z, p), z, p, shift)(rhs, border)
 
     def linear_system(
         self, z: Lanes, p: Parameters, directions: Float[np.ndarray, "lanes k parameters"]
     ) -> LinearSystem:
         """F, F_p along directions, and solves with F_z; computed together."""
         changes = [np.ascontiguousarray(each) for each in directions.transpose(1, 0, 2)]
-        residual, column, *parts = self.linearised(
-            z, p, changes[0] if changes else np.zeros_like(p)
-        )
+        first = changes[0] if changes else np.zeros_like(p)
+        residual, column, *parts = self.linearised(z, p, first)
         others = [self.linearised(z, p, dp)[1] for dp in changes[1:]]
         columns = np.stack([column, *others], axis=1)[:, : len(changes)]
-        return LinearSystem(residual, columns, partial(self.solve_with, tuple(parts), z, p))
+        return LinearSystem(residual, columns, self.solver(tuple(parts), z, p))
 
 
 def advance_by(

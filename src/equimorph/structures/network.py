@@ -1,10 +1,11 @@
 """Networks of named joints and edges between them: what trusses and frames have in common."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, fields
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, fields
 from functools import cached_property
-from typing import Annotated, Any, ClassVar, Protocol, TypeVar, runtime_checkable
+from itertools import pairwise
+from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -13,13 +14,15 @@ from equimorph.argument_notes import NAME
 from equimorph.errors import InputError, suggestion
 from equimorph.structures.unit_system import Quantity, UnitSystem
 
-Part = TypeVar("Part")
 Ends = Int[np.ndarray, "edges 2"]
 Places = Float[np.ndarray, "joints space"]
 Joints = Annotated[
     Mapping[str, Sequence[Quantity]],
     "places of finite numbers, or texts with their unit, by joint, like `{'A': (0, 1)}`",
 ]
+
+SLENDER = 0.5
+"""Largest radius of gyration √(EI/EA) of a member, relative to its length."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,15 +32,31 @@ class Network(ABC):
     joints: tuple[str, ...]
     places: Places
     ends: Ends
+    members: tuple[Any, ...]
+    """What its user gave as edges; a member in space may have several."""
     edge: ClassVar[str]
     """What one edge is called."""
     whole: ClassVar[str]
     """What the network is called."""
 
-    @property
-    @abstractmethod
+    @cached_property
     def edge_names(self) -> list[str]:
         """Names of the edges: the joints at their starts and ends, joined."""
+        return ["-".join(self.joints[end] for end in pair) for pair in self.ends.tolist()]
+
+    @property
+    @abstractmethod
+    def lengths(self) -> Float[np.ndarray, " edges"]:
+        """Lengths of the edges that actuators change."""
+
+    @abstractmethod
+    def supports_data(self) -> list[Any]:
+        """Supports of the joints, as their user gives them."""
+
+    @property
+    def space(self) -> int:
+        """Two or three dimensions."""
+        return int(self.places.shape[1])
 
     @cached_property
     def chords(self) -> Float[np.ndarray, "edges space"]:
@@ -64,6 +83,16 @@ class Network(ABC):
             f"`{self.edge}` must be one of {', '.join(names)}; got {name!r}."
             f"{suggestion(str(name), names)}"
         )
+
+    def end(self, name: str, joint: str) -> tuple[int, int]:
+        """Place of an edge in the list, and 0 for its start or 1 for its end at a joint."""
+        at, _ = self.place_of_edge(name)
+        ends = self.edge_names[at].split("-")
+        if joint not in ends:
+            raise InputError(
+                f"`joint` must be an end of {self.edge} {self.edge_names[at]}; got {joint!r}."
+            )
+        return at, ends.index(joint)
 
     def check(self) -> None:
         """Refuse what is no network in one piece.
@@ -135,36 +164,121 @@ def places_of_joints(
     return tuple(given), np.array(places)
 
 
-@runtime_checkable
-class Edge(Protocol):
-    """A member or bar between two joints."""
+class Edge:
+    """A bar or member as its user describes it, through two or more joints: a frozen dataclass."""
+
+    edge: ClassVar[str]
+    """What it is called."""
+    through: ClassVar[str] = "ends"
+    """Field with the names of its joints."""
+    quantities: ClassVar[Mapping[str, str]]
+    """What each of its numbers measures."""
+
+    @property
+    def corners(self) -> Sequence[str]:
+        """Names of its joints."""
+        found: Sequence[str] = getattr(self, self.through)
+        return found
 
     @property
     def name(self) -> str:
-        """Its name."""
+        """Its joints, joined: A-B."""
+        return "-".join(self.corners)
 
-    @property
-    def ends(self) -> Sequence[str]:
-        """Names of its joints."""
+    @classmethod
+    def read(cls, given: Any) -> Self:
+        """Itself, or one from its data or the names of its joints.
+
+        Raises
+        ------
+        InputError
+            For data that it does not take; what is wrong with one value is said by the edge.
+        """
+        if isinstance(given, cls):
+            return given
+        data = given if isinstance(given, Mapping) else {cls.through: given}
+        known = [field.name for field in fields(cls)]  # type: ignore[arg-type]  # all are dataclasses
+        if cls.through not in data or not set(data) <= set(known):
+            raise InputError(
+                f"`{cls.edge}s` must hold {cls.__name__}s ({', '.join(known)}) or pairs of joints; "
+                f"got {given!r}."
+            )
+        return cls(**data)
+
+    def measured(self, system: UnitSystem) -> Self:
+        """The same with its numbers in a system of units."""
+        there = {key: of for key, of in self.quantities.items() if getattr(self, key) is not None}
+        return system.measured(self, there, f"{self.edge} {self.name}")
+
+    def data(self) -> dict[str, Any]:
+        """Return what it is made from."""
+        given = asdict(self)  # type: ignore[call-overload]  # all are dataclasses
+        given = {key: value for key, value in given.items() if value is not None}
+        return {**given, self.through: list(self.corners)}
 
 
-def ends_of_edges(edges: Iterable[Edge], joints: Sequence[str], edge: str) -> Ends:
-    """Numbers of the joints that edges join.
+def check_hinges(member: Edge, hinges: Collection[str], which: str) -> None:
+    """Refuse hinges that are not at different joints of a member.
+
+    Raises
+    ------
+    InputError
+        With the member.
+    """
+    strange = [end for end in hinges if end not in member.corners]
+    if strange or len(set(hinges)) < len(hinges):
+        raise InputError(
+            f"`hinges` of member {member.name} must name {which}, each once; got {hinges!r}."
+        )
+
+
+def arc_length(member: Edge, curvature: float, chord: float, gyration: float) -> float:
+    """Length of an arc over a chord, of a member with a radius of gyration √(EI/EA).
+
+    Raises
+    ------
+    InputError
+        If no slender arc fits.
+    """
+    half = 0.5 * abs(curvature) * chord
+    if half >= 1.0:
+        raise InputError(
+            f"`curvature` of member {member.name} must be less than 2 over the distance of its "
+            f"joints, {2.0 / chord:.6g}, a half circle; got {curvature!r}."
+        )
+    length = chord if half == 0.0 else chord * float(np.arcsin(half)) / half
+    if gyration > SLENDER * length:
+        raise InputError(
+            f"`EI` and `EA` of member {member.name} must be those of a slender rod in one system "
+            f"of units; got a radius of gyration of {gyration:.3g} and a length of {length:.3g}."
+        )
+    return length
+
+
+def edges_between(
+    members: Iterable[Edge], joints: Sequence[str]
+) -> tuple[Ends, Int[np.ndarray, " edges"]]:
+    """Numbers of the joints that edges join, one edge for each two successive joints of a member.
+
+    And the member to which each edge belongs.
 
     Raises
     ------
     InputError
         For an unknown joint.
     """
-    found = []
-    for each in edges:
-        for end in each.ends:
-            if end not in joints:
+    found, owner = [], []
+    for m, each in enumerate(members):
+        for joint in each.corners:
+            if joint not in joints:
                 raise InputError(
-                    f"`ends` of {edge} {each.name} must be joints ({', '.join(joints)}); got {end}."
+                    f"`{each.through}` of {each.edge} {each.name} must be joints "
+                    f"({', '.join(joints)}); got {joint}."
                 )
-        found.append([joints.index(end) for end in each.ends])
-    return np.array(found, dtype=int).reshape(-1, 2)
+        pairs = [[joints.index(end) for end in pair] for pair in pairwise(each.corners)]
+        found += pairs
+        owner += [m] * len(pairs)
+    return np.array(found, dtype=int).reshape(-1, 2), np.array(owner, dtype=int)
 
 
 def supported_joints(
@@ -215,29 +329,6 @@ def check_parameter_names(names: Sequence[str]) -> None:
                 "`loads` and `actuators` must have different names of letters, digits and "
                 f"underscores; got {name!r}."
             )
-
-
-def built(kind: type[Part], given: Any, what: str, joints: str = "ends") -> Part:
-    """Edge of a network from one, from its data, or from the names of its joints.
-
-    `joints` is the field that takes these.
-
-    Raises
-    ------
-    InputError
-        For data that the kind does not take; what is wrong with one value is said by the kind.
-    """
-    if isinstance(given, kind):
-        return given
-    data = given if isinstance(given, Mapping) else {joints: given}
-    known = [field.name for field in fields(kind)]  # type: ignore[arg-type]  # all are dataclasses
-    strange = [name for name in data if name not in known]
-    if strange or joints not in data:
-        raise InputError(
-            f"`{what}` must hold {kind.__name__}s ({', '.join(known)}) or pairs of joints; got "
-            f"{given!r}."
-        )
-    return kind(**data)
 
 
 def length_limits(

@@ -203,7 +203,7 @@ def test_a_curved_cantilever_is_an_arc():
     assert frame.moment("A-B", "A")(state) == pytest.approx(0.0, abs=1e-12)
     assert frame.max_curvature(state) == pytest.approx(2.0, rel=1e-12)
     assert frame.total_energy(state) == pytest.approx(0.0, abs=1e-13)
-    with pytest.raises(em.InputError, match="`axis` must be x or y"):
+    with pytest.raises(em.InputError, match="`axis` must be one of x, y"):
         frame.displacement("B", "angle")
 
 

@@ -134,7 +134,7 @@ def test_a_wrong_member_is_refused(data, text):
         ("moment(A-C,A)", "`member` must be one of A-B, B-C; got 'A-C'"),
         ("moment(A-B,C)", "`joint` must be an end of member A-B; got 'C'"),
         ("displacement(D, x)", "`joint` must be one of A, B, C; got 'D'"),
-        ("displacement(B, z)", "`axis` must be x or y; got 'z'"),
+        ("displacement(B, z)", "`axis` must be one of x, y; got 'z'"),
         ("reaction(B, x)", "`B.x` must be held or sprung by a support; it is free"),
         ("reaction(A, z)", "`axis` must be one of x, y, angle; got 'z'"),
         ("rotation(C)", r"`rotation\(C\)` must be of a joint where a member is not hinged"),

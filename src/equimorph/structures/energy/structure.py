@@ -243,13 +243,11 @@ class EnergyStructure(DiscreteStructure):
         """∂L/∂p."""
         return self._graphs.effort(z, p)
 
-    def entries(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes entries"]:
+    def parts(self, z: Lanes, p: Parameters) -> tuple[np.ndarray, ...]:
         """Entries of F_z in the order of `layout`."""
-        return self._graphs.matrix(z, p)
+        return (self._graphs.matrix(z, p),)
 
-    def linearised(
-        self, z: Lanes, p: Parameters, dp: Parameters
-    ) -> tuple[Lanes, Lanes, Float[np.ndarray, "lanes entries"]]:
+    def linearised(self, z: Lanes, p: Parameters, dp: Parameters) -> tuple[np.ndarray, ...]:
         """F, F_p·dp and the entries of F_z, from one tape."""
         values = self._graphs.step(z, p, dp)
         residual, column, entries = np.split(values, [self.size, 2 * self.size], axis=1)

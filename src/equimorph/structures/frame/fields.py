@@ -1,23 +1,26 @@
 """Places, turns, forces and curvatures of a frame."""
 
 from functools import cached_property
+from typing import ClassVar, Self
 
 import numpy as np
 from jaxtyping import Float
-from numpy.polynomial import legendre
 
 from equimorph.arrays import Lanes, Parameters
 from equimorph.linalg.dense import multiply
+from equimorph.model import Support
+from equimorph.model.drawing import supports_of_point, unit_vectors
+from equimorph.structures.frame.any_frame import AnyFrame
 from equimorph.structures.frame.mechanics import FrameMechanics
-
-FINE = 21
-"""Places in each element among which an extremum of the curvature is sought."""
-POLISHING = 5
-"""Newton iterations from there."""
+from equimorph.structures.frame.model import FrameModel
 
 
-class FrameFields(FrameMechanics):
+class FrameFields(FrameMechanics, AnyFrame):
     """A frame with the fields that descriptors and figures show, in units of its model."""
+
+    model: FrameModel
+    stations: ClassVar[int] = 9
+    turn_of_unknowns: ClassVar[float] = 1.0
 
     def displacements(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes joints 2"]:
         """Moves of the joints: what a load of size 1 on each would travel."""
@@ -118,45 +121,61 @@ class FrameFields(FrameMechanics):
         return len(self.model.lengths), mesh.elements, mesh.degree + 1
 
     def largest_curvatures(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes members"]:
-        """max |κ| in every member: the largest value on a fine grid, polished in each element."""
-        to_legendre, degree = self.model.mesh.reference.to_legendre, self.model.mesh.degree
-        grid = np.linspace(-1.0, 1.0, FINE)
-        series = np.einsum("ij,lmej->lmei", to_legendre, self.curvatures(z, p))
-        values = np.abs(np.einsum("ij,lmej->lmei", legendre.legvander(grid, degree), series))
-        start = grid[values.argmax(axis=3)]
-        slope = np.pad(legendre.legder(np.eye(degree + 1)), ((0, 1), (0, 0)))
-        first = np.einsum("ij,lmej->lmei", slope, series)
-        second = np.einsum("ij,lmej->lmei", slope, first)
-        place, step = start, grid[1] - grid[0]
-        for _ in range(POLISHING):
-            basis = legendre.legvander(place, degree)
-            bend = (basis * second).sum(axis=3)
-            move = (basis * first).sum(axis=3) / np.where(bend == 0.0, np.inf, bend)
-            place = np.clip(
-                place - move, np.maximum(start - step, -1.0), np.minimum(start + step, 1.0)
-            )
-        polished = np.abs((legendre.legvander(place, degree) * series).sum(axis=3))
-        return np.asarray(np.maximum(polished, values.max(axis=3)).max(axis=2))
+        """max |κ| in every member."""
+        found = self.curvatures(z, p)
+        elements = len(self.model.nodes), found.shape[-1]
+        largest = self.largest_norms(found.reshape(len(z), *elements, 1))
+        return np.asarray(largest.reshape(found.shape[:3]).max(axis=2))
 
-    def outline(
-        self, z: Lanes, p: Parameters, s: Float[np.ndarray, " points"]
-    ) -> Float[np.ndarray, "lanes members points 2"]:
-        """Places along the members at shares of their lengths, moves of the joints included."""
-        model, (psi, stretch) = self.model, self.stretches(z, p)
-        matrix = model.mesh.integration(s)[:, : model.mesh.elements * model.mesh.degree + 1]
-        shape = (len(z), *self._elements)
-        angles = (model.directions + psi).reshape(shape)
-        longer = stretch.reshape(shape)
-        count = model.mesh.elements * model.mesh.degree
-        parts = []
-        starts = (model.network.places[None] / model.length + self.displacements(z, p))[
-            :, model.network.ends[:, 0]
-        ]
-        for axis, function in enumerate((np.cos, np.sin)):
-            field = longer * function(angles)
-            whole = np.concatenate(
-                [field[..., :-1].reshape(*shape[:2], count), field[:, :, -1, -1:]], axis=2
-            )
-            moved = np.einsum("ij,lmj->lmi", matrix, whole) * model.lengths[:, None]
-            parts.append(starts[:, :, None, axis] + moved)
-        return np.stack(parts, axis=3)
+    def stretched_tangents(
+        self, z: Lanes, p: Parameters
+    ) -> Float[np.ndarray, "lanes members elements order 2"]:
+        """Derivatives of the places by arclength as drawn."""
+        psi, stretch = self.stretches(z, p)
+        angles = self.model.directions + psi
+        field = stretch[..., None] * np.stack([np.cos(angles), np.sin(angles)], axis=2)
+        return np.asarray(field.reshape(len(z), *self._elements, 2))
+
+    # --- soundness and supports -----------------------------------------------------------------
+
+    def moved_by(self, turns: Float[np.ndarray, " rows"]) -> Float[np.ndarray, " unknowns"]:
+        """The turns themselves."""
+        return turns
+
+    def circulating(
+        self, forces: Float[np.ndarray, " multipliers"]
+    ) -> Float[np.ndarray, "members 2"]:
+        """Forces in the members without loads."""
+        starts = [each.start[: self.constraints] for each in self.model.forces]
+        return np.stack([forces @ each for each in starts], axis=1)
+
+    def guess_for(self, finer: Self, z: Lanes, p: Parameters) -> Lanes:
+        """States as guesses of those of the same frame with other elements."""
+        model, fine = self.model, finer.model
+        matrix = model.mesh.interpolation(fine.mesh.nodes)
+        turns = self.turns(z, self.scalars(z, p))[:, model.member_nodes] @ matrix.T
+        nodes = np.zeros((len(z), len(fine.place)))
+        nodes[:, fine.member_nodes] = turns
+        return np.concatenate([nodes[:, fine.place >= 0], z[:, self.unknowns :]], axis=1)
+
+    def drawn_supports(
+        self, z: Lanes, p: Parameters, places: Float[np.ndarray, "lanes joints 2"]
+    ) -> tuple[Support, ...]:
+        """Symbols of the supports, at places of the joints; they turn with these."""
+        nodes = self.model.joint_nodes
+        turns = np.where(nodes >= 0, self.turns(z, self.scalars(z, p))[:, nodes], 0.0)
+        found: list[Support] = []
+        for joint, stiffness in enumerate(self.model.network.supports):
+            if stiffness.any():
+                inward = unit_vectors(turns[:, joint] + self._inward_angle(joint))
+                found += supports_of_point(stiffness, places[:, joint], inward)
+        return tuple(found)
+
+    def _inward_angle(self, joint: int) -> float:
+        """Mean direction from a joint into its members, as drawn."""
+        model = self.model
+        tangents = model.tangents.reshape(len(model.lengths), -1, 2)
+        total = np.zeros(2)
+        for (start, end), tangent in zip(model.network.ends, tangents, strict=True):
+            total += tangent[0] * (start == joint) - tangent[-1] * (end == joint)
+        return float(np.arctan2(total[1], total[0]))

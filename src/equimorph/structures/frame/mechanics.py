@@ -8,9 +8,8 @@ from jaxtyping import Float, Int
 
 from equimorph.arrays import Entries, Flags, Lanes, Nodal, Parameters, Scalars, Values
 from equimorph.linalg.dense import multiply
-from equimorph.linalg.lanes import over_lanes
 from equimorph.linalg.sparse import SparseLayout
-from equimorph.structures.discrete import DiscreteStructure
+from equimorph.structures.discrete import DiscreteStructure, linearise
 from equimorph.structures.equations import Direction
 from equimorph.structures.frame.kernels import linearise_lanes
 from equimorph.structures.frame.model import FrameModel
@@ -80,24 +79,7 @@ class FrameMechanics(DiscreteStructure):
 
     def linearised(self, z: Lanes, p: Parameters, dp: Parameters) -> tuple[Lanes, Lanes, Entries]:
         """F, F_p·dp and the entries of F_z."""
-        residual, column = np.empty_like(z), np.empty_like(z)
-        entries = np.empty((len(z), len(self.layout.rows)))
-        given = [np.ascontiguousarray(array) for array in (z, p, dp)]
-        if len(z):
-            over_lanes(linearise_lanes, self.tables.shared, given, [residual, column, entries])
-        return residual, column, entries
-
-    def residual(self, z: Lanes, p: Parameters) -> Lanes:
-        """Moments that are missing at the nodes, and gaps in the cycles."""
-        return self.linearised(z, p, np.zeros_like(p))[0]
-
-    def parameter_derivative(self, z: Lanes, p: Parameters, dp: Parameters) -> Lanes:
-        """F_p·dp."""
-        return self.linearised(z, p, dp)[1]
-
-    def entries(self, z: Lanes, p: Parameters) -> Entries:
-        """Entries of F_z."""
-        return self.linearised(z, p, np.zeros_like(p))[2]
+        return linearise(linearise_lanes, self.tables.shared, self.layout, (z, p, dp))
 
     @cached_property
     def _assembled(self) -> Float[np.ndarray, "nodes nodes"]:

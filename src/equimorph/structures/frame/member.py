@@ -1,8 +1,8 @@
 """Members of a frame, and supports of its joints, as their user describes them."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
-from typing import Annotated, Any
+from dataclasses import dataclass
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from jaxtyping import Float
@@ -11,23 +11,13 @@ from equimorph.argument_checks import check_arguments
 from equimorph.argument_kinds import one_of
 from equimorph.argument_notes import TWO_NAMES, positive_quantity
 from equimorph.errors import InputError
-from equimorph.structures.network import built
+from equimorph.structures.network import Edge, arc_length, check_hinges
 from equimorph.structures.unit_system import Quantity, UnitSystem
-
-QUANTITIES = {
-    "EI": "force·length²",
-    "EA": "force",
-    "curvature": "1/length",
-    "weight": "force/length",
-}
-"""What each number of a member measures."""
-SLENDER = 0.5
-"""Largest radius of gyration √(EI/EA) of a member, relative to its length."""
 
 
 @check_arguments
 @dataclass(frozen=True)
-class Member:
+class Member(Edge):
     """An elastic rod between two joints, straight or a circular arc where it is free of stress.
 
     Numbers are in the units of the frame; texts like "0.3 N m^2" are converted to these.
@@ -52,6 +42,13 @@ class Member:
         units it is a number in any system to which the units of force, length and time belong.
     """
 
+    edge: ClassVar[str] = "member"
+    quantities: ClassVar[Mapping[str, str]] = {
+        "EI": "force·length²",
+        "EA": "force",
+        "curvature": "1/length",
+        "weight": "force/length",
+    }
     ends: Annotated[Sequence[str], TWO_NAMES]
     EI: Quantity = 1.0
     EA: Quantity | None = None
@@ -62,56 +59,22 @@ class Member:
 
     def __post_init__(self) -> None:
         """Check the hinges."""
-        strange = [end for end in self.hinges if end not in self.ends]
-        if strange or len(set(self.hinges)) < len(self.hinges):
-            raise InputError(
-                f"`hinges` of member {self.name} must name one or both of its ends, each once; "
-                f"got {self.hinges!r}."
-            )
-
-    @property
-    def name(self) -> str:
-        """Its joints, joined: A-B."""
-        return "-".join(self.ends)
-
-    def measured(self, system: UnitSystem) -> "Member":
-        """The same member with its numbers in a system of units."""
-        return system.measured(self, QUANTITIES, f"member {self.name}")
+        check_hinges(self, self.hinges, "one or both of its ends")
 
     def length(self, chord: float) -> float:
         """Length of the arc over a chord; InputError if no slender arc fits."""
-        half = 0.5 * abs(float(self.curvature)) * chord
-        if half >= 1.0:
-            raise InputError(
-                f"`curvature` of member {self.name} must be less than 2 over the distance of its "
-                f"joints, {2.0 / chord:.6g}, a half circle; got {self.curvature!r}."
-            )
-        length = chord if half == 0.0 else chord * float(np.arcsin(half)) / half
         gyration = 0.0 if self.EA is None else float(np.sqrt(float(self.EI) / float(self.EA)))
-        if gyration > SLENDER * length:
-            raise InputError(
-                f"`EI` and `EA` of member {self.name} must be those of a slender rod in one system "
-                f"of units; got a radius of gyration of {gyration:.3g} and a "
-                f"length of {length:.3g}."
-            )
-        return length
+        return arc_length(self, float(self.curvature), chord, gyration)
 
     def data(self) -> dict[str, Any]:
         """Return what it is made from."""
-        given = {key: value for key, value in asdict(self).items() if value is not None}
-        return {**given, "ends": list(self.ends), "hinges": list(self.hinges)}
+        return {**super().data(), "hinges": list(self.hinges)}
 
 
 MemberSpec = Annotated[
     Member | Annotated[Sequence[str], TWO_NAMES] | Mapping[str, Any],
     "members, pairs of different joints, or data of members",
 ]
-
-
-def member_of(given: MemberSpec) -> Member:
-    """Member from a `Member`, its data, or the names of its ends."""
-    return built(Member, given, "members")
-
 
 AXES = ("x", "y", "angle")
 Stiffness = Annotated[float | str, positive_quantity]

@@ -7,11 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from equimorph.structures.frame.any_model import AnyFrameModel
 from equimorph.structures.frame.network import FrameNetwork
-from equimorph.structures.frame.patterns import Patterns
 from equimorph.structures.frame.statics import Graph
-from equimorph.structures.rod.discretisation import Mesh
-from equimorph.structures.unit_system import UnitSystem
 
 Scalars = Float[np.ndarray, "scalars scalars"]
 
@@ -29,7 +27,7 @@ class Forces(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class FrameModel:
+class FrameModel(AnyFrameModel):
     """The Lagrangian of a frame in turns ψ of its nodes and *scalars* y = (multipliers, p, 1).
 
     ``L = ½ ψᵀKψ − ψ·(slope y) − Σ ((1 + e) P + ½ γ P²) + ½ yᵀ Q y`` with the sum over the nodes of
@@ -39,25 +37,9 @@ class FrameModel:
     of supports and loads when the joints' positions are eliminated: the forces f in the members
     balance for any y, and with unit tangents t, T as drawn, ``L = bending − ∫ f·(t − T) ds − …``.
     The derivative by a multiplier says that a cycle of members closes.
-
-    Parameters
-    ----------
-    network
-        The frame as its user sees it.
-    patterns
-        What its parameters do, non-dimensional.
-    mesh
-        Elements of a member of length 1.
-    length, bending
-        Units of length and of bending stiffness, in those of the user's `system`.
     """
 
     network: FrameNetwork
-    patterns: Patterns
-    mesh: Mesh
-    length: float
-    bending: float
-    system: UnitSystem
 
     # --- numbering ------------------------------------------------------------------------------
 
@@ -89,10 +71,10 @@ class FrameModel:
         """Node that turns with each joint; −1 where all members are hinged."""
         return self._numbered[1]
 
-    @cached_property
-    def nodes(self) -> Int[np.ndarray, "elements order"]:
-        """Nodes of each element of each member."""
-        return self.member_nodes[:, self.mesh.element_nodes].reshape(-1, self.mesh.degree + 1)
+    @property
+    def rows_of_nodes(self) -> Int[np.ndarray, "members nodes"]:
+        """Nodes along each member, from start to end."""
+        return self.member_nodes
 
     @cached_property
     def place(self) -> Int[np.ndarray, " nodes"]:
@@ -116,22 +98,7 @@ class FrameModel:
         x, y = (len(graph.circulations().members) for graph in self.graphs)
         return x, y
 
-    @property
-    def scalars(self) -> int:
-        """Number of multipliers and parameters, and 1 for the constant."""
-        return self.multipliers + self.patterns.count + 1
-
-    @property
-    def own(self) -> slice:
-        """Parameters among the scalars."""
-        return slice(self.multipliers, self.scalars - 1)
-
     # --- forces ---------------------------------------------------------------------------------
-
-    @cached_property
-    def lengths(self) -> Float[np.ndarray, " members"]:
-        """Lengths of the members."""
-        return np.asarray(self.network.lengths / self.length)
 
     @cached_property
     def graphs(self) -> tuple[Graph, Graph]:
@@ -149,18 +116,13 @@ class FrameModel:
 
     def _forces(self, axis: int, first: int) -> Forces:
         graph, made = self.graphs[axis], self.network
-        lines = self.patterns.lines[:, :, axis]
-        loads = self.patterns.forces[:, :, axis].copy()
-        # a line load reaches the end of its member; the start's share is what the cycles decide
-        for m, end in enumerate(made.ends[:, 1].tolist()):
-            loads[:, end] += lines[:, m] * self.lengths[m]
         start, drop = np.zeros((2, self.scalars, len(self.lengths)))
         supports = np.zeros((self.scalars, len(made.joints)))
-        around, carried = graph.circulations(), graph.carrying_forces(loads)
+        around, carried = graph.circulations(), graph.carrying_forces(self.loads[:, :, axis])
         last = first + len(around.members)
         start[first:last], supports[first:last] = around
         start[self.own], supports[self.own] = carried
-        drop[self.own] = lines
+        drop[self.own] = self.patterns.lines[:, :, axis]
         return Forces(start, drop, supports)
 
     def points_of(self, forces: Forces) -> Float[np.ndarray, "points scalars"]:
@@ -223,9 +185,8 @@ class FrameModel:
     @cached_property
     def softness(self) -> Float[np.ndarray, " points"]:
         """γ: axial compliance over the quadrature weight."""
-        unit = self.bending / self.length**2
-        given = [0.0 if each.EA is None else unit / float(each.EA) for each in self.network.members]
-        return np.asarray(np.array(given)[self.owner] / self.weights)
+        axial = [np.inf if each.EA is None else float(each.EA) for each in self.network.members]
+        return np.asarray((self.force / np.array(axial))[self.owner] / self.weights)
 
     # --- members and joints ---------------------------------------------------------------------
 
@@ -264,7 +225,7 @@ class FrameModel:
         total = np.zeros((len(self.place), self.scalars))
         for j, node in enumerate(self.joint_nodes.tolist()):
             if self.supports[j, 2] > 0.0:
-                total[node, self.own] = self.patterns.turns[:, j]
+                total[node, self.own] = self.patterns.turns[:, j, 0]
         return total
 
     @cached_property
@@ -278,7 +239,7 @@ class FrameModel:
     def natural(self) -> Float[np.ndarray, "members scalars"]:
         """Actuated curvature of the members."""
         total = np.zeros((len(self.lengths), self.scalars))
-        total[:, self.own] = self.patterns.curvature.T
+        total[:, self.own] = self.patterns.strains[..., 0].T
         return total
 
     @cached_property

@@ -3,34 +3,32 @@
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from jaxtyping import Bool, Float
 
 from equimorph.errors import InputError
+from equimorph.structures.frame.any_network import WEIGHT, AnyFrameNetwork
 from equimorph.structures.frame.member import (
     AXES,
     Member,
     MemberSpec,
     SupportSpec,
-    member_of,
     stiffnesses,
+    support_data,
 )
 from equimorph.structures.network import (
     Joints,
-    Network,
-    ends_of_edges,
+    edges_between,
     places_of_joints,
     supported_joints,
 )
 from equimorph.structures.unit_system import UnitSystem
 
-WEIGHT = "weight"
-
 
 @dataclass(frozen=True, eq=False)
-class FrameNetwork(Network):
+class FrameNetwork(AnyFrameNetwork):
     """Joints in their places, the members between them, and their supports.
 
     supports: stiffness against x, y and turning, ∞ where held, 0 where free.
@@ -38,13 +36,8 @@ class FrameNetwork(Network):
 
     members: tuple[Member, ...]
     supports: Float[np.ndarray, "joints 3"]
-    edge: ClassVar[str] = "member"
-    whole: ClassVar[str] = "frames"
-
-    @property
-    def edge_names(self) -> list[str]:
-        """Names of the members."""
-        return [member.name for member in self.members]
+    axes_of_turns: ClassVar[int] = 1
+    sizes_of_loads: ClassVar[tuple[int, ...]] = (2, 3)
 
     @cached_property
     def lengths(self) -> Float[np.ndarray, " members"]:
@@ -65,19 +58,49 @@ class FrameNetwork(Network):
         found[self.ends[~self.hinged]] = True
         return found
 
-    def member(self, name: str) -> tuple[int, float]:
-        """Place of a member in the list, and −1 if it is named from end to start, else 1."""
-        return self.place_of_edge(name)
+    def supports_data(self) -> list[dict[str, Any]]:
+        """Tables of the supports."""
+        return [support_data(row) for row in self.supports]
 
-    def end(self, member: str, joint: str) -> tuple[int, int]:
-        """Place of a member in the list, and 0 for its start or 1 for its end at a joint."""
-        at, _ = self.member(member)
-        ends = self.members[at].ends
-        if joint not in ends:
-            raise InputError(
-                f"`joint` must be an end of member {self.members[at].name}; got {joint!r}."
-            )
-        return at, list(ends).index(joint)
+    @property
+    def bending(self) -> float:
+        """Mean bending stiffness of the members: the unit of bending stiffnesses."""
+        return float(np.mean([float(member.EI) for member in self.members]))
+
+    @property
+    def weights(self) -> Float[np.ndarray, " members"]:
+        """Weights per length; 0 where none is given."""
+        return np.array([float(member.weight or 0.0) for member in self.members])
+
+    @property
+    def turning_places(self) -> int:
+        """Joints."""
+        return len(self.joints)
+
+    def place_of_turn(self, joint: str) -> int:
+        """Joint that a support turns; InputError if it does not."""
+        return self.support_place(joint, "angle")[0]
+
+    def check_move(self, joint: str, move: Float[np.ndarray, "2"], what: str) -> None:
+        """Refuse a move of a support along an axis that it neither holds nor springs."""
+        del what
+        for axis in np.flatnonzero(move):
+            self.support_place(joint, AXES[axis])
+
+    def has_rigid_member(self, joint: int) -> bool:
+        """Whether a member is rigidly joined to a joint."""
+        return bool(self.rigid[joint])
+
+    def bears(
+        self, forces: Float[np.ndarray, "joints 2"], couples: Float[np.ndarray, " joints"]
+    ) -> bool:
+        """Whether supports alone bear a load on the joints."""
+        given = np.column_stack([forces, couples])
+        return not given[~np.isinf(self.supports)].any()
+
+    def signs_of_strains(self, direction: float) -> Float[np.ndarray, "1"]:
+        """A curvature to the left is one to the right from the other end."""
+        return np.array([direction])
 
     def support_place(self, joint: str, axis: str) -> tuple[int, int]:
         """Joint and axis (0, 1, 2) of a support."""
@@ -104,8 +127,8 @@ def frame_network(
         not reach, unknown supports, or joints that are not connected to the rest.
     """
     names, places = places_of_joints(joints, system, (2,), reserved=(WEIGHT,))
-    made = tuple(member_of(each).measured(system) for each in members)
-    ends = ends_of_edges(made, names, "member")
+    made = tuple(Member.read(each).measured(system) for each in members)
+    ends, _ = edges_between(made, names)
     held = np.zeros((len(names), 3))
     for at, joint, given in supported_joints(supports, names):
         held[at] = stiffnesses(joint, given, system)
@@ -113,6 +136,11 @@ def frame_network(
     result.check()
     assert result.lengths.all()  # arcs that do not reach are refused here
     _check_angles(result)
+    for axis, stiff in zip(AXES, held.T[:2], strict=False):
+        if not stiff.any():
+            raise InputError(
+                f"`frame` must be no mechanism; nothing holds it in {axis}. Add a support."
+            )
     return result
 
 

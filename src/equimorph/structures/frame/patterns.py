@@ -9,41 +9,57 @@ from jaxtyping import Bool, Float
 
 from equimorph.argument_kinds import is_listed, is_number, one_of
 from equimorph.errors import InputError
-from equimorph.structures.frame.network import WEIGHT, FrameNetwork
+from equimorph.structures.frame.any_network import WEIGHT, AnyFrameNetwork
 from equimorph.structures.network import check_parameter_names, vector
 
 Loads = Annotated[
     Mapping[str, Mapping[str, Sequence[float]]],
     "forces or line loads of finite numbers by joint or member, by the name of the load, like "
-    "`{'F': {'B': (0, -1)}}`",
+    "`{'F': {'B': (0, -1)}}`, or in space `{'F': {'B': (0, 0, -1)}}`",
 ]
-Effects = Mapping[
-    Annotated[str, one_of("curvature", "length", "move", "turn")],
-    Mapping[str, float | Sequence[float]],
-]
+KINDS = ("curvature", "length", "move", "turn")
+Effects = Mapping[Annotated[str, one_of(*KINDS)], Mapping[str, float | Sequence[float]]]
 Actuators = Annotated[
     Mapping[str, Effects],
     "effects of finite numbers (curvature, length, move, turn) by the name of the actuator, like "
-    "`{'a': {'curvature': {'A-B': 1.0}}}`",
+    "`{'a': {'length': {'A-B': 1.0}}}`",
 ]
-KINDS = ("curvature", "length", "move", "turn")
+EULER = 10.0
+"""Force that buckles a pinned rod of unit length and stiffness, about."""
+OUTER_COUPLE = 2.0
+"""Couple that bends such a rod by about 1."""
+TENTH = 0.1
+"""Move or elongation that does."""
 
 
 @dataclass(frozen=True, eq=False)
 class Patterns:
-    """Forces, couples, line loads, curvatures, elongations, moves and turns by parameter.
+    """Forces, couples, line loads, strains, elongations, moves and turns by parameter.
 
-    factors: parameters that multiply weights, and are numbers without unit.
+    strains: the curvature, or in space twist and curvatures about n and b; turns: angles of the
+    joints, or in space rotation vectors of the bodies; factors: parameters that multiply weights,
+    and are numbers without unit.
     """
 
-    forces: Float[np.ndarray, "parameters joints 2"]
+    forces: Float[np.ndarray, "parameters joints space"]
     couples: Float[np.ndarray, "parameters joints"]
-    lines: Float[np.ndarray, "parameters members 2"]
-    curvature: Float[np.ndarray, "parameters members"]
-    length: Float[np.ndarray, "parameters members"]
-    moves: Float[np.ndarray, "parameters joints 2"]
-    turns: Float[np.ndarray, "parameters joints"]
+    lines: Float[np.ndarray, "parameters pieces space"]
+    strains: Float[np.ndarray, "parameters pieces axes"]
+    length: Float[np.ndarray, "parameters pieces"]
+    moves: Float[np.ndarray, "parameters joints space"]
+    turns: Float[np.ndarray, "parameters turning axes"]
     factors: Bool[np.ndarray, " parameters"]
+
+    @classmethod
+    def none(cls, made: AnyFrameNetwork, count: int) -> "Patterns":
+        """Parameters without any effect."""
+        joints, pieces, axes = len(made.joints), len(made.ends), made.axes_of_turns
+        forces, moves = np.zeros((2, count, joints, made.space))
+        return cls(
+            forces, np.zeros((count, joints)), np.zeros((count, pieces, made.space)),
+            np.zeros((count, pieces, axes)), np.zeros((count, pieces)), moves,
+            np.zeros((count, made.turning_places, axes)), np.zeros(count, bool),
+        )  # fmt: skip
 
     @property
     def count(self) -> int:
@@ -57,42 +73,43 @@ class Patterns:
             self.forces / force,
             self.couples / (force * length),
             self.lines * (length / force),
-            self.curvature * length,
+            self.strains * length,
             self.length / length,
             self.moves / length,
             self.turns,
             self.factors,
         )
 
-    def unit(self, k: int) -> str:
-        """Unit of a parameter; "1" if it stands for several kinds."""
+    def quantity(self, k: int) -> str:
+        """What a parameter measures; "1" if it stands for several kinds."""
         given = {
-            "force": self.forces,
-            "force·length": self.couples,
-            "force/length": self.lines,
-            "1/length": self.curvature,
-            "length": np.concatenate([self.length, self.moves[..., 0], self.moves[..., 1]], axis=1),
-            "rad": self.turns,
+            "force": self.forces[k].any(),
+            "force·length": self.couples[k].any(),
+            "force/length": self.lines[k].any(),
+            "1/length": self.strains[k].any(),
+            "length": self.length[k].any() or self.moves[k].any(),
+            "rad": self.turns[k].any(),
         }
-        found = [unit for unit, array in given.items() if array[k].any()]
+        found = [quantity for quantity, some in given.items() if some]
         return found[0] if len(found) == 1 and not self.factors[k] else "1"
 
     def typical(self, k: int) -> float:
         """Value of a non-dimensional parameter that bends a member of length 1 by about 1."""
-        euler = 10.0
         sizes = (
-            np.abs(self.forces[k]).max(initial=0.0) / euler,
-            np.abs(self.lines[k]).max(initial=0.0) / euler,
-            np.abs(self.couples[k]).max(initial=0.0) / 2.0,
-            np.abs(self.curvature[k]).max(initial=0.0),
-            np.abs(self.length[k]).max(initial=0.0) * 10.0,
-            np.abs(self.moves[k]).max(initial=0.0) * 10.0,
+            np.abs(self.forces[k]).max(initial=0.0) / EULER,
+            np.abs(self.lines[k]).max(initial=0.0) / EULER,
+            np.abs(self.couples[k]).max(initial=0.0) / OUTER_COUPLE,
+            np.abs(self.strains[k]).max(initial=0.0),
+            np.abs(self.length[k]).max(initial=0.0) / TENTH,
+            np.abs(self.moves[k]).max(initial=0.0) / TENTH,
             np.abs(self.turns[k]).max(initial=0.0),
         )
         return 1.0 / float(max(sizes))
 
 
-def patterns(made: FrameNetwork, actuators: Actuators, loads: Loads) -> Patterns:
+def patterns(
+    made: AnyFrameNetwork, actuators: Mapping[str, Effects], loads: Mapping[str, Any]
+) -> Patterns:
     """Patterns of all parameters, actuators first.
 
     Raises
@@ -102,13 +119,7 @@ def patterns(made: FrameNetwork, actuators: Actuators, loads: Loads) -> Patterns
         no effect.
     """
     check_parameter_names([*actuators, *loads])
-    count, joints, members = len(actuators) + len(loads), len(made.joints), len(made.members)
-    both, single = (count, joints, 2), (count, joints)
-    found = Patterns(
-        np.zeros(both), np.zeros(single), np.zeros((count, members, 2)),
-        np.zeros((count, members)), np.zeros((count, members)), np.zeros(both), np.zeros(single),
-        np.zeros(count, bool),
-    )  # fmt: skip
+    found = Patterns.none(made, len(actuators) + len(loads))
     for k, (name, given) in enumerate(actuators.items()):
         _fill_actuator(made, found, k, f"actuators.{name}", given)
     for k, (name, forces) in enumerate(loads.items(), len(actuators)):
@@ -116,72 +127,74 @@ def patterns(made: FrameNetwork, actuators: Actuators, loads: Loads) -> Patterns
     return found
 
 
-def _number(value: Any, what: str) -> float:
-    if not (is_number(value) and value):
-        raise InputError(f"`{what}` must be a finite number other than 0; got {value!r}.")
-    return float(value)
-
-
-def _fill_actuator(made: FrameNetwork, into: Patterns, k: int, what: str, given: Effects) -> None:
+def _fill_actuator(
+    made: AnyFrameNetwork, into: Patterns, k: int, what: str, given: Effects
+) -> None:
     if not given:
         raise InputError(f"`{what}` must have an effect ({', '.join(KINDS)}); got none.")
     for kind, table in given.items():
-        where = f"{what}.{kind}"
         if not table:
-            raise InputError(f"`{where}` must say where it acts; got an empty table.")
+            raise InputError(f"`{what}.{kind}` must say where it acts; got an empty table.")
         for name, value in table.items():
-            here = f"{where}.{name}"
-            if kind == "move":
-                _fill_move(made, into, k, here, name, value)
-            elif kind == "turn":
-                into.turns[k, made.support_place(name, "angle")[0]] = _number(value, here)
+            here = f"{what}.{kind}.{name}"
+            sizes = {"length": 1, "move": made.space}
+            change = _numbers(value, sizes.get(kind, made.axes_of_turns), here)
+            if kind == "turn":
+                into.turns[k, made.place_of_turn(name)] += change
+            elif kind == "move":
+                made.check_move(name, change, here)
+                into.moves[k, made.joint(name)] += change
             else:
-                member, sign = made.member(name)
-                array = into.curvature if kind == "curvature" else into.length
-                array[k, member] = _number(value, here) * (sign if kind == "curvature" else 1.0)
+                _fill_pieces(made, into, k, name, change if kind == "curvature" else change[0])
 
 
-def _fill_move(
-    made: FrameNetwork, into: Patterns, k: int, what: str, name: Any, given: Any
-) -> None:
-    move = vector(given if is_listed(given) else [given], [2], what)
-    for axis, value in enumerate(move):
-        if value:
-            into.moves[k, made.support_place(name, "xy"[axis])[0], axis] = value
-    if not any(move):
-        raise InputError(f"`{what}` must not be zero; got {given!r}.")
+def _fill_pieces(made: AnyFrameNetwork, into: Patterns, k: int, name: str, change: Any) -> None:
+    """Strains of the pieces of a member, or a change of its length."""
+    pieces = made.pieces_of(name)
+    whole = made.lengths[[at for at, _ in pieces]].sum()
+    for at, sign in pieces:
+        if np.ndim(change):
+            into.strains[k, at] += change * made.signs_of_strains(sign)
+        else:
+            into.length[k, at] += change * made.lengths[at] / whole
+
+
+def _numbers(value: Any, size: int, what: str) -> Float[np.ndarray, " size"]:
+    """Numbers that are not all 0; one may be given as it is."""
+    if size == 1 and not (is_number(value) and value):
+        raise InputError(f"`{what}` must be a finite number other than 0; got {value!r}.")
+    given = value if is_listed(value) else [value]
+    found = np.array(vector(list(given), [size], what), dtype=float)
+    if not found.any():
+        raise InputError(f"`{what}` must not be zero; got {value!r}.")
+    return found
 
 
 def _fill_load(
-    made: FrameNetwork, into: Patterns, k: int, what: str, given: Mapping[str, Sequence[float]]
+    made: AnyFrameNetwork, into: Patterns, k: int, what: str, given: Mapping[str, Sequence[float]]
 ) -> None:
     for name, value in given.items():
         here = f"{what}.{name}"
-        if name == WEIGHT:
-            weights = np.array([float(member.weight or 0.0) for member in made.members])
-            if not weights.any():
-                raise InputError(f"`{here}` must act on members with a weight; got none that has.")
-            into.factors[k] = True
-            into.lines[k] += weights[:, None] * np.array(vector(value, [2], here))
-        elif name in made.joints:
-            force = vector(value, [2, 3], here)
+        if name in made.joints:
+            force = np.array(vector(value, made.sizes_of_loads, here))
             joint = made.joint(name)
-            into.forces[k, joint] = force[:2]
-            into.couples[k, joint] = force[2] if len(force) == 3 else 0.0
-            if into.couples[k, joint] and not made.rigid[joint]:
+            into.forces[k, joint] += force[: made.space]
+            into.couples[k, joint] += force[made.space :].sum()
+            if into.couples[k, joint] and not made.has_rigid_member(joint):
                 raise InputError(
                     f"`{here}` must have no couple where every member is hinged; got {value!r}."
                 )
+            continue
+        line = np.array(vector(value, [made.space], here))
+        if name == WEIGHT:
+            weights = made.weights
+            if not weights.any():
+                raise InputError(f"`{here}` must act on members with a weight; got none that has.")
+            into.factors[k] = True
+            into.lines[k] += weights[:, None] * line
         elif "-" in name:
-            into.lines[k, made.member(name)[0]] += vector(value, [2], here)
+            into.lines[k, [at for at, _ in made.pieces_of(name)]] += line
         else:
             made.joint(name)
-    _check_effect(made, into, k, what)
-
-
-def _check_effect(made: FrameNetwork, into: Patterns, k: int, what: str) -> None:
-    """Refuse a load that supports alone bear."""
-    fast = np.isinf(made.supports)
-    forces, couples = into.forces[k], into.couples[k]
-    if not (forces[~fast[:, :2]].any() or couples[~fast[:, 2]].any() or into.lines[k].any()):
+    if not into.lines[k].any() and made.bears(into.forces[k], into.couples[k]):
         raise InputError(f"`{what}` must act on a member, or on a joint that is free to move.")

@@ -71,15 +71,15 @@ class _Image:
         bend = self.turn * np.where(self.reversed, -1.0, 1.0)
         for k in range(given.count):
             vectors = (given.forces[k], given.moves[k])
-            angles = (given.couples[k], given.turns[k])
-            here = [*vectors, *angles, given.lines[k], given.curvature[k], given.length[k]]
+            angles = (given.couples[k], given.turns[k, :, 0])
+            here = [*vectors, *angles, given.lines[k], given.strains[k, :, 0], given.length[k]]
             image = [np.zeros_like(each) for each in here]
             for i, each in enumerate(vectors):
                 image[i][self.joints] = self.axes * each
             for i, each in enumerate(angles, 2):
                 image[i][self.joints] = self.turn * each
             image[4][self.there] = self.axes * given.lines[k]
-            image[5][self.there] = bend * given.curvature[k]
+            image[5][self.there] = bend * given.strains[k, :, 0]
             image[6][self.there] = given.length[k]
             heres.append(np.concatenate([each.ravel() for each in here]))
             mapped.append(np.concatenate([each.ravel() for each in image]))

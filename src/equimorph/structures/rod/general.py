@@ -10,7 +10,7 @@ from equimorph.linalg import Border, BorderedSolution, CondensedLayout, no_borde
 from equimorph.linalg.lanes import over_lanes
 from equimorph.linalg.sparse import SparseLayout
 from equimorph.structures.contract import Symmetry
-from equimorph.structures.equations import Advance, Direction, JointEquations
+from equimorph.structures.equations import Advance, Direction, JointEquations, Solver
 from equimorph.structures.rod.discretisation import Reference
 from equimorph.structures.rod.fields import GeneralFields
 from equimorph.structures.rod.general_kernels import linearise_lanes, second_lanes
@@ -193,7 +193,7 @@ class GeneralMechanics(JointEquations, PlanarMechanics):
     def inertia(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes unknowns unknowns"]:
         """JᵀWJ of the unknown angles."""
         columns = place_derivatives(self.model, self.nodal_angles(z, p), self.scalars(z, p))
-        _, gradients, trailing = self.linearised(z, p, np.zeros_like(p))[2:]
+        _, gradients, trailing = self.parts(z, p)
         inner = self.unknown_nodes
         return kinetic_matrix(self.model, columns, gradients[:, :, inner], trailing, inner)
 
@@ -233,14 +233,6 @@ class GeneralMechanics(JointEquations, PlanarMechanics):
         y[:, -1] = 0.0
         return self._angles(v_z, y), self._pressure(y)[:, None]
 
-    def residual(self, z: Lanes, p: Parameters) -> Lanes:
-        """F(z; p)."""
-        return self.linearised(z, p, np.zeros_like(p))[0]
-
-    def parameter_derivative(self, z: Lanes, p: Parameters, dp: Parameters) -> Lanes:
-        """F_p·dp."""
-        return self.linearised(z, p, dp)[1]
-
     def second_derivative(self, z: Lanes, p: Parameters, v: Direction, w: Direction) -> Lanes:
         """D²F[v, w]."""
         arrays = self.check_widths((z, p), v, w)
@@ -258,35 +250,24 @@ class GeneralMechanics(JointEquations, PlanarMechanics):
             out[:, : self.unknowns] -= total[:, self.unknown_nodes]
         return out
 
-    def solve(
-        self,
-        z: Lanes,
-        p: Parameters,
-        rhs: Float[np.ndarray, "lanes sides bordered"],
-        border: Border | None = None,
-        shift: Values | None = None,
-    ) -> BorderedSolution:
-        """Solve with F_z − shift·mass, bordered."""
-        diagonal, gradients, trailing = self.linearised(z, p, np.zeros_like(p))[2:]
-        if shift is not None:
-            diagonal -= shift[:, None] * self.mesh.weights
-        return self.solve_with((diagonal, gradients, trailing), z, p, rhs, border)
-
-    def solve_with(
-        self,
-        parts: tuple[np.ndarray, ...],
-        z: Lanes,
-        p: Parameters,
-        rhs: Float[np.ndarray, "lanes sides bordered"],
-        border: Border | None,
-    ) -> BorderedSolution:
-        """Solve with F_z, given by its parts; under pressure every angle works on every other."""
+    def solver(
+        self, parts: tuple[np.ndarray, ...], z: Lanes, p: Parameters, shift: Values | None = None
+    ) -> Solver:
+        """Solves with F_z − shift·mass; under pressure every angle works on every other."""
         diagonal, gradients, trailing = parts
+        if shift is not None:
+            diagonal = diagonal - shift[:, None] * self.mesh.weights
         if self._area is not None:
             entries = self._pressed_entries(self._area, z, p, diagonal, gradients, trailing)
-            return self._full_layout.solve(entries, border, rhs)
-        around = no_border(len(z), self.size) if border is None else border
-        return self.layout.solve(diagonal, gradients, *around, rhs, trailing=trailing)
+            return lambda rhs, border: self._full_layout.solve(entries, border, rhs)
+
+        def solve(
+            rhs: Float[np.ndarray, "lanes sides bordered"], border: Border | None
+        ) -> BorderedSolution:
+            around = no_border(len(z), self.size) if border is None else border
+            return self.layout.solve(diagonal, gradients, *around, rhs, trailing=trailing)
+
+        return solve
 
     @cached_property
     def _full_layout(self) -> SparseLayout:

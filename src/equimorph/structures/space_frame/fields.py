@@ -1,15 +1,18 @@
 """Places, rotations, forces and curvatures of a frame in space."""
 
 from functools import cached_property
+from typing import ClassVar, Self
 
 import numpy as np
 from jaxtyping import Float
-from numpy.polynomial import legendre
 
 from equimorph.arrays import Lanes, Parameters
-from equimorph.structures.discrete import DiscreteStructure
+from equimorph.model import Support
+from equimorph.structures.frame.any_frame import AnyFrame
+from equimorph.structures.space_frame.drawing import spatial_symbols
 from equimorph.structures.space_frame.lagrangian import gathered
 from equimorph.structures.space_frame.mechanics import SpatialFrameMechanics
+from equimorph.structures.space_frame.model import SpatialFrameModel
 from equimorph.structures.space_frame.network import Turning
 from equimorph.structures.space_frame.statics import SpaceFlows
 from equimorph.structures.spatial.quaternions import (
@@ -19,16 +22,15 @@ from equimorph.structures.spatial.quaternions import (
     rotation_vectors,
 )
 
-FINE = 21
-"""Places in each element among which an extremum of the curvature is sought."""
-POLISHING = 5
-"""Newton iterations from there."""
-
 Vectors = Float[np.ndarray, "lanes elements order 3"]
 
 
-class SpatialFrameFields(SpatialFrameMechanics, DiscreteStructure):
+class SpatialFrameFields(SpatialFrameMechanics, AnyFrame):
     """A frame in space with the fields that descriptors and figures show, in units of its model."""
+
+    model: SpatialFrameModel
+    stations: ClassVar[int] = 3
+    turn_of_unknowns: ClassVar[float] = 2.0
 
     # --- joints ---------------------------------------------------------------------------------
 
@@ -137,53 +139,17 @@ class SpatialFrameFields(SpatialFrameMechanics, DiscreteStructure):
         return np.asarray(elastic + (free + drawn)[:, :, None])
 
     def largest_curvatures(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes pieces"]:
-        """Largest bending curvature √(κ_n² + κ_b²) in every piece, polished in each element."""
-        mesh = self.model.mesh
-        bends = self.section_strains(z, p)[..., 1:]
-        series = np.einsum("ij,lejk->leik", mesh.reference.to_legendre, bends)
-        grid = np.linspace(-1.0, 1.0, FINE)
-        sizes = np.linalg.norm(
-            np.einsum("gi,leik->legk", legendre.legvander(grid, mesh.degree), series), axis=3
-        )
-        start = grid[sizes.argmax(axis=2)]
-        slope = np.pad(legendre.legder(np.eye(mesh.degree + 1)), ((0, 1), (0, 0)))
-        first = np.einsum("ij,lejk->leik", slope, series)
-        second = np.einsum("ij,lejk->leik", slope, first)
-        place, step = start, grid[1] - grid[0]
-        for _ in range(POLISHING):
-            basis = legendre.legvander(place, mesh.degree)
-            value, rate, bend = (
-                np.einsum("lei,leik->lek", basis, each) for each in (series, first, second)
-            )
-            down = (value * rate).sum(axis=2)
-            curved = (value * bend + rate**2).sum(axis=2)
-            move = np.where(curved < 0.0, down / np.where(curved == 0.0, 1.0, curved), 0.0)
-            place = np.clip(
-                place - move, np.maximum(start - step, -1.0), np.minimum(start + step, 1.0)
-            )
-        basis = legendre.legvander(place, mesh.degree)
-        polished = np.linalg.norm(np.einsum("lei,leik->lek", basis, series), axis=2)
-        largest = np.maximum(polished, sizes.max(axis=2))
+        """Largest bending curvature √(κ_n² + κ_b²) in every piece."""
+        largest = self.largest_norms(self.section_strains(z, p)[..., 1:])
         return np.asarray(largest.reshape(len(z), *self._elements[:2]).max(axis=2))
 
-    def outline(
-        self, z: Lanes, p: Parameters, s: Float[np.ndarray, " points"]
-    ) -> Float[np.ndarray, "lanes pieces points 3"]:
-        """Places along the pieces at shares of their lengths, moves of the joints included."""
-        model, mesh = self.model, self.model.mesh
+    def stretched_tangents(
+        self, z: Lanes, p: Parameters
+    ) -> Float[np.ndarray, "lanes pieces elements order 3"]:
+        """Derivatives of the places by arclength as drawn."""
         _, w, _, y = self.jets(z, p)
-        count = mesh.elements * mesh.degree
-        field = (self.chords(w, y)[0] / model.weights[..., None]).reshape(
-            len(z), *self._elements, 3
-        )
-        whole = np.concatenate(
-            [field[:, :, :, :-1].reshape(len(z), model.pieces, count, 3), field[:, :, -1:, -1]],
-            axis=2,
-        )
-        moved = np.einsum("ij,lkja->lkia", mesh.integration(s)[:, : count + 1], whole)
-        joints = model.network.places[None] / model.length + self.displacements(z, p)
-        starts = joints[:, model.network.ends[:, 0]]
-        return np.asarray(starts[:, :, None] + moved * model.lengths[:, None, None])
+        field = self.chords(w, y)[0] / self.model.weights[..., None]
+        return np.asarray(field.reshape(len(z), *self._elements, 3))
 
     def axes_along(
         self, z: Lanes, p: Parameters, s: Float[np.ndarray, " points"]
@@ -199,3 +165,39 @@ class SpatialFrameFields(SpatialFrameMechanics, DiscreteStructure):
         about = matrices(exponential(turn[..., None] * np.array([0.0, 0.0, 1.0])))
         drawn = np.einsum("kab,kibc->kiac", model.network.axes, about)
         return np.asarray(np.einsum("lkiab,kibc->lkiac", matrices(w), drawn))
+
+    # --- soundness and supports -----------------------------------------------------------------
+
+    def moved_by(self, turns: Float[np.ndarray, " rows"]) -> Float[np.ndarray, " unknowns"]:
+        """Quaternions turned by half of the rotation vectors; angles of hinges."""
+        free = len(self.model.free)
+        quaternions = np.zeros((free, 4))
+        quaternions[:, 1:] = 0.5 * turns[: 3 * free].reshape(free, 3)
+        return np.concatenate([quaternions.ravel(), turns[3 * free :]])
+
+    def circulating(
+        self, forces: Float[np.ndarray, " multipliers"]
+    ) -> Float[np.ndarray, "pieces 3"]:
+        """Forces in the pieces without loads."""
+        starts = self.model.forces.members[: self.constraints]
+        return np.asarray(np.einsum("s,ska->ka", forces, starts))
+
+    def guess_for(self, finer: Self, z: Lanes, p: Parameters) -> Lanes:
+        """States as guesses of those of the same frame with other elements."""
+        model, fine = self.model, finer.model
+        matrix = model.mesh.interpolation(fine.mesh.nodes)
+        turns, bodies = self.turns(z, p), len(model.network.bodies)
+        nodes = np.zeros((len(z), len(fine.turning), 4))
+        nodes[:, :bodies] = turns[:, :bodies]
+        along = np.einsum("ij,lkja->lkia", matrix, turns[:, model.piece_nodes])
+        along /= np.linalg.norm(along, axis=-1, keepdims=True)
+        nodes[:, fine.piece_nodes[:, 1:-1]] = along[:, :, 1:-1]
+        q = nodes[:, fine.free].reshape(len(z), 4 * len(fine.free))
+        return np.concatenate([q, z[:, 4 * len(model.free) :]], axis=1)
+
+    def drawn_supports(
+        self, z: Lanes, p: Parameters, places: Float[np.ndarray, "lanes joints 3"]
+    ) -> tuple[Support, ...]:
+        """Symbols of the supports, at places of the joints."""
+        del z, p
+        return spatial_symbols(self.model.network, places)

@@ -279,14 +279,6 @@ class SpatialFrameLagrangian:
         slope += gathered(leaning, model.parents, len(model.turning))
         return by_angle
 
-    def residual(self, z: Lanes, p: Parameters) -> Lanes:
-        """F(z; p)."""
-        return np.asarray(self.equations(z, p)[0])
-
-    def parameter_derivative(self, z: Lanes, p: Parameters, dp: Parameters) -> Lanes:
-        """F_p·dp."""
-        return np.asarray(self.equations(z, p, (np.zeros_like(z), dp))[1])
-
     def second_derivative(self, z: Lanes, p: Parameters, v: Direction, w: Direction) -> Lanes:
         """D²F[v, w]."""
         return np.asarray(self.equations(z, p, v, w)[3])

@@ -9,9 +9,9 @@ from jaxtyping import Float
 from equimorph.arrays import Entries, Flags, Lanes, Parameters, Values
 from equimorph.linalg import Border, BorderedSolution
 from equimorph.linalg.dense import no_border
-from equimorph.linalg.lanes import over_lanes
 from equimorph.linalg.sparse import SparseLayout
-from equimorph.structures.equations import JointEquations, LinearSystem
+from equimorph.structures.discrete import linearise
+from equimorph.structures.equations import JointEquations, Solver
 from equimorph.structures.space_frame.kernels import linearise_lanes
 from equimorph.structures.space_frame.lagrangian import SpatialFrameLagrangian
 from equimorph.structures.space_frame.model import SpatialFrameModel
@@ -55,12 +55,11 @@ class SpatialFrameMechanics(SpatialFrameLagrangian, JointEquations):
 
     # --- contract -------------------------------------------------------------------------------
 
-    def _linearised(
-        self, z: Lanes, p: Parameters, dp: Parameters, shift: Values
-    ) -> tuple[Lanes, Lanes, Entries]:
-        """F, F_p·dp and the entries of F_z − shift·mass."""
-        residual, column = np.empty_like(z), np.empty_like(z)
-        entries = np.empty((len(z), len(self.layout.rows)))
+    def linearised(
+        self, z: Lanes, p: Parameters, dp: Parameters, shift: Values | None = None
+    ) -> tuple[np.ndarray, ...]:
+        """F, F_p·dp, and the entries of F_z − shift·mass in rotations with F and the shift."""
+        lowered = np.zeros(len(z)) if shift is None else shift
         y = self.scalars(z, p)
         rates = np.zeros_like(y)
         rates[:, self.constraints : -1] = dp
@@ -69,29 +68,12 @@ class SpatialFrameMechanics(SpatialFrameLagrangian, JointEquations):
         velocity = 2.0 * np.einsum("l...ka,l...a->l...k", moved, turns[1])
         count = len(self.model.held)
         held = turns[0].reshape(len(z), 4 * count), velocity.reshape(len(z), 3 * count)
-        given = [np.ascontiguousarray(array) for array in (z, p, dp, *held, shift[:, None])]
-        if len(z):
-            over_lanes(linearise_lanes, self.tables.shared, given, [residual, column, entries])
+        given = (z, p, dp, *held, lowered[:, None])
+        out = linearise(linearise_lanes, self.tables.shared, self.layout, given)
         first, last = 3 * len(self.model.free), self.tables.count
         slots = self.layout.diagonal[first:last]
-        entries[:, slots] -= shift[:, None] * self.mass[4 * len(self.model.free) :]
-        return residual, column, entries
-
-    def linearised(self, z: Lanes, p: Parameters, dp: Parameters) -> tuple[Lanes, Lanes, Entries]:
-        """F, F_p·dp and the entries of F_z in rotations."""
-        return self._linearised(z, p, dp, np.zeros(len(z)))
-
-    def residual(self, z: Lanes, p: Parameters) -> Lanes:
-        """Moments that are missing at the nodes, and gaps in the cycles."""
-        return self.linearised(z, p, np.zeros_like(p))[0]
-
-    def parameter_derivative(self, z: Lanes, p: Parameters, dp: Parameters) -> Lanes:
-        """F_p·dp."""
-        return self.linearised(z, p, dp)[1]
-
-    def entries(self, z: Lanes, p: Parameters) -> Entries:
-        """Entries of F_z in rotations."""
-        return self.linearised(z, p, np.zeros_like(p))[2]
+        out[2][:, slots] -= lowered[:, None] * self.mass[4 * len(self.model.free) :]
+        return *out, out[0], lowered
 
     def solve(
         self,
@@ -102,32 +84,17 @@ class SpatialFrameMechanics(SpatialFrameLagrangian, JointEquations):
         shift: Values | None = None,
     ) -> BorderedSolution:
         """Solve with the KKT matrix F_z − shift·mass, bordered, by sparse LDLᵀ."""
-        moved = np.zeros(len(z)) if shift is None else shift
-        residual, _, entries = self._linearised(z, p, np.zeros_like(p), moved)
-        return self._solved(z, residual, entries, rhs, border, moved)
+        parts = self.linearised(z, p, np.zeros_like(p), shift)[2:]
+        return self.solver(parts, z, p)(rhs, border)
 
-    def solve_with(
-        self,
-        parts: tuple[np.ndarray, ...],
-        z: Lanes,
-        p: Parameters,
-        rhs: Float[np.ndarray, "lanes sides bordered"],
-        border: Border | None,
-    ) -> BorderedSolution:
-        """Solve with F_z, given by its entries and F, bordered."""
-        entries, residual = parts
-        return self._solved(z, residual, entries, rhs, border, np.zeros(len(z)))
-
-    def linear_system(
-        self, z: Lanes, p: Parameters, directions: Float[np.ndarray, "lanes k parameters"]
-    ) -> LinearSystem:
-        """F, F_p along directions, and solves with F_z; computed together."""
-        changes = [np.ascontiguousarray(each) for each in directions.transpose(1, 0, 2)]
-        first = changes[0] if changes else np.zeros_like(p)
-        residual, column, entries = self.linearised(z, p, first)
-        columns = [column, *(self.linearised(z, p, dp)[1] for dp in changes[1:])]
-        solve = partial(self.solve_with, (entries, residual), z, p)
-        return LinearSystem(residual, np.stack(columns, axis=1)[:, : len(changes)], solve)
+    def solver(
+        self, parts: tuple[np.ndarray, ...], z: Lanes, p: Parameters, shift: Values | None = None
+    ) -> Solver:
+        """Solves with the matrix whose parts are given, which is reduced to rotations."""
+        assert shift is None, "the parts contain it"
+        entries, residual, lowered = parts
+        at = self._coordinates(z, residual, lowered)
+        return partial(self._solved, at, entries)
 
     # --- solves in rotations --------------------------------------------------------------------
 
@@ -158,16 +125,14 @@ class SpatialFrameMechanics(SpatialFrameLagrangian, JointEquations):
 
     def _solved(
         self,
-        z: Lanes,
-        residual: Lanes,
+        at: Coordinates,
         entries: Entries,
         rhs: Float[np.ndarray, "lanes sides bordered"],
         border: Border | None,
-        shift: Values,
     ) -> BorderedSolution:
         """Solve with the matrix of these entries, which is reduced to rotations."""
-        around = no_border(len(z), self.size) if border is None else border
-        at, k = self._coordinates(z, residual, shift), around[0].shape[1]
+        around = no_border(len(rhs), self.size) if border is None else border
+        k = around[0].shape[1]
         columns, small_columns = self._split(at, around[0])
         rows, small_rows = self._split(at, around[1])
         right, small = self._split(at, rhs[:, :, : self.size])

@@ -1,9 +1,8 @@
 """Members of a frame in space, as their user describes them."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
-from itertools import pairwise
-from typing import Annotated, Any
+from dataclasses import dataclass, replace
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from jaxtyping import Float
@@ -12,21 +11,14 @@ from equimorph.argument_checks import check_arguments
 from equimorph.argument_kinds import one_of
 from equimorph.argument_notes import SEVERAL_NAMES, SPACE_DIRECTION, THREE_QUANTITIES
 from equimorph.errors import InputError
-from equimorph.structures.network import built
+from equimorph.structures.network import Edge, arc_length, check_hinges
 from equimorph.structures.rod.sections import CrossSection, cross_section
 from equimorph.structures.unit_system import Quantity, UnitSystem
 
 BALL = "ball"
 """Hinge that transmits forces only."""
-QUANTITIES = {
-    **dict.fromkeys(("EI", "EI_out", "GJ"), "force·length²"),
-    **{"EA": "force", "curvature": "1/length", "length": "length", "weight": "force/length"},
-}
-"""What each number of a member measures."""
 ROUND_TORSION = 1.0 / 1.3
 """GJ over EI of a round section whose Poisson's ratio is 0.3."""
-SLENDER = 0.5
-"""Largest radius of gyration √(EI/EA) of a piece of a member, relative to its length."""
 UPRIGHT = 1e-6
 """Sine of the angle between a chord and z below which the normal is drawn along x."""
 
@@ -52,7 +44,7 @@ class Stiffness:
 
 @check_arguments
 @dataclass(frozen=True)
-class SpatialMember:
+class SpatialMember(Edge):
     """An elastic rod through two or more joints, free of stress as drawn.
 
     It is drawn straight from joint to joint, or in arcs towards its normal, and passes through
@@ -92,6 +84,12 @@ class SpatialMember:
         Weight per length, for loads on "weight", or a text like "0.1 kg/m"; None: the section's.
     """
 
+    edge: ClassVar[str] = "member"
+    through: ClassVar[str] = "joints"
+    quantities: ClassVar[Mapping[str, str]] = {
+        **dict.fromkeys(("EI", "EI_out", "GJ"), "force·length²"),
+        **{"EA": "force", "curvature": "1/length", "length": "length", "weight": "force/length"},
+    }
     joints: Annotated[Sequence[str], SEVERAL_NAMES]
     section: CrossSection | Mapping[str, Any] | None = None
     EI: Quantity | None = None
@@ -108,12 +106,7 @@ class SpatialMember:
 
     def __post_init__(self) -> None:
         """Check the hinges, and that nothing is said twice."""
-        strange = [joint for joint in self.hinges if joint not in self.joints]
-        if strange or len(set(self.hinges)) < len(self.hinges):
-            raise InputError(
-                f"`hinges` of member {self.name} must name some of its joints, each once; got "
-                f"{self.hinges!r}."
-            )
+        check_hinges(self, self.hinges, "some of its joints")
         if self.section is None:
             return
         for key in ("EI", "EI_out", "GJ", "EA", "weight"):
@@ -122,16 +115,6 @@ class SpatialMember:
                     f"`{key}` of member {self.name} must be left out beside `section`, which gives "
                     f"it; got {getattr(self, key)!r}."
                 )
-
-    @property
-    def name(self) -> str:
-        """Its joints, joined: A-B-C."""
-        return "-".join(self.joints)
-
-    @property
-    def pieces(self) -> list[tuple[str, str]]:
-        """Pairs of successive joints."""
-        return list(pairwise(self.joints))
 
     def hinge(self, joint: str) -> str | tuple[float, ...] | None:
         """What connects it to a joint: None if rigidly joined, "ball", or the axis of a hinge."""
@@ -144,8 +127,7 @@ class SpatialMember:
 
     def measured(self, system: UnitSystem) -> "SpatialMember":
         """The same member with its numbers in a system of units."""
-        there = {name: of for name, of in QUANTITIES.items() if getattr(self, name) is not None}
-        found = system.measured(self, there, f"member {self.name}")
+        found = super().measured(system)
         strains = system.numbers(self.strains, "1/length", f"strains of member {self.name}")
         return replace(found, strains=tuple(float(x) for x in strains))
 
@@ -163,21 +145,8 @@ class SpatialMember:
 
     def arc_length(self, chord: float, stiff: Stiffness) -> float:
         """Length of an arc over a chord; InputError if no slender arc fits."""
-        half = 0.5 * abs(float(self.curvature)) * chord
-        if half >= 1.0:
-            raise InputError(
-                f"`curvature` of member {self.name} must be less than 2 over the distance of its "
-                f"joints, {2.0 / chord:.6g}, a half circle; got {self.curvature!r}."
-            )
-        length = chord if half == 0.0 else chord * float(np.arcsin(half)) / half
         gyration = 0.0 if stiff.EA is None else float(np.sqrt(min(stiff.strain[1:]) / stiff.EA))
-        if gyration > SLENDER * length:
-            raise InputError(
-                f"`EI` and `EA` of member {self.name} must be those of a slender rod in one system "
-                f"of units; got a radius of gyration of {gyration:.3g} and a length of "
-                f"{length:.3g}."
-            )
-        return length
+        return arc_length(self, float(self.curvature), chord, gyration)
 
     def axes(self, chord: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 3"]:
         """Tangent, normal and binormal, as columns, in the middle of a piece as drawn."""
@@ -196,8 +165,7 @@ class SpatialMember:
 
     def data(self) -> dict[str, Any]:
         """Return what it is made from."""
-        given = {key: value for key, value in asdict(self).items() if value is not None}
-        given["joints"], given["strains"] = list(self.joints), list(self.strains)
+        given = super().data() | {"strains": list(self.strains)}
         if self.normal is not None:
             given["normal"] = [float(x) for x in self.normal]
         if self.section is not None:
@@ -217,8 +185,3 @@ SpatialMemberSpec = Annotated[
     SpatialMember | Annotated[Sequence[str], SEVERAL_NAMES] | Mapping[str, Any],
     "members, sequences of different joints, or data of members",
 ]
-
-
-def member_of(given: SpatialMemberSpec) -> SpatialMember:
-    """Member from a `SpatialMember`, its data, or the names of its joints."""
-    return built(SpatialMember, given, "members", "joints")

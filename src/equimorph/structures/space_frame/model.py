@@ -7,12 +7,10 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from equimorph.structures.rod.discretisation import Mesh
+from equimorph.structures.frame.any_model import AnyFrameModel
 from equimorph.structures.space_frame.network import SpatialNetwork, Turning
-from equimorph.structures.space_frame.patterns import SpatialPatterns
 from equimorph.structures.space_frame.statics import NOTHING, SpaceFlows, SpaceStatics
 from equimorph.structures.spatial.quaternions import exponential, matrices
-from equimorph.structures.unit_system import UnitSystem
 
 LENGTH_STIFFNESS = 4000.0
 """Stiffness of the lengths of quaternions in the metric, in units of bending: margins are known
@@ -34,7 +32,7 @@ class Acting(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class SpatialFrameModel:
+class SpatialFrameModel(AnyFrameModel):
     """The Lagrangian of a frame in turns w of its nodes and *scalars* y = (multipliers, p, 1).
 
     ``L = Σ m (½ v·Sv − v·b − (1 + e) N − ½ c N²) + ½ yᵀ Q y`` with the sum over the nodes of every
@@ -47,25 +45,9 @@ class SpatialFrameModel:
 
     Bodies at the joints, which rigidly joined members share, are the first nodes. One that is
     hinged turns by an angle φ about its axis a on its parent: w = w_parent exp(a φ/2).
-
-    Parameters
-    ----------
-    network
-        The frame as its user sees it.
-    patterns
-        What its parameters do, non-dimensional.
-    mesh
-        Elements of a piece of length 1.
-    length, bending
-        Units of length and of bending stiffness, in those of the user's `system`.
     """
 
     network: SpatialNetwork
-    patterns: SpatialPatterns
-    mesh: Mesh
-    length: float
-    bending: float
-    system: UnitSystem
 
     # --- numbering ------------------------------------------------------------------------------
 
@@ -82,10 +64,10 @@ class SpatialFrameModel:
         ends = self.network.body_of_end
         return np.concatenate([ends[:, :1], rows, ends[:, 1:]], axis=1)
 
-    @cached_property
-    def nodes(self) -> Int[np.ndarray, "elements order"]:
-        """Nodes of each element of each piece."""
-        return self.piece_nodes[:, self.mesh.element_nodes].reshape(-1, self.mesh.degree + 1)
+    @property
+    def rows_of_nodes(self) -> Int[np.ndarray, "pieces nodes"]:
+        """Nodes along each piece, from start to end."""
+        return self.piece_nodes
 
     @cached_property
     def turning(self) -> Int[np.ndarray, " nodes"]:
@@ -136,22 +118,7 @@ class SpatialFrameModel:
         """Number of forces that balance without loads."""
         return len(self._circulating.members)
 
-    @property
-    def scalars(self) -> int:
-        """Number of multipliers and parameters, and 1 for the constant."""
-        return self.multipliers + self.patterns.count + 1
-
-    @property
-    def own(self) -> slice:
-        """Parameters among the scalars."""
-        return slice(self.multipliers, self.scalars - 1)
-
     # --- forces ---------------------------------------------------------------------------------
-
-    @cached_property
-    def lengths(self) -> Float[np.ndarray, " pieces"]:
-        """Lengths of the pieces as drawn."""
-        return np.asarray(self.network.drawn_lengths / self.length)
 
     @cached_property
     def statics(self) -> SpaceStatics:
@@ -166,11 +133,7 @@ class SpatialFrameModel:
     @cached_property
     def forces(self) -> SpaceFlows:
         """Forces at the starts of the pieces, and of the supports, by scalar."""
-        lines, loads = self.patterns.lines, self.patterns.forces.copy()
-        # a line load reaches the end of its piece; the start's share is what the cycles decide
-        for k, end in enumerate(self.network.ends[:, 1].tolist()):
-            loads[:, end] += lines[:, k] * self.lengths[k]
-        around, carried = self._circulating, self.statics.carrying_forces(loads)
+        around, carried = self._circulating, self.statics.carrying_forces(self.loads)
         none = SpaceFlows(np.zeros((1, self.pieces, 3)), np.zeros((1, len(self.network.joints), 3)))
         parts = zip(around, carried, none, strict=True)
         members, supports = (np.concatenate(each) for each in parts)
@@ -252,8 +215,7 @@ class SpatialFrameModel:
     @cached_property
     def compliance(self) -> Float[np.ndarray, " pieces"]:
         """c: strain by unit tension."""
-        unit = self.bending / self.length**2
-        made = [0.0 if each.EA is None else unit / each.EA for each in self.network.made]
+        made = [0.0 if each.EA is None else self.force / each.EA for each in self.network.made]
         return np.asarray(np.array(made)[self.network.owner])
 
     # --- what scalars do ------------------------------------------------------------------------

@@ -4,15 +4,16 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from enum import IntEnum
 from functools import cached_property
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from jaxtyping import Float, Int
 
 from equimorph.errors import InputError
+from equimorph.structures.frame.any_network import WEIGHT, AnyFrameNetwork
 from equimorph.structures.network import (
     Joints,
-    Network,
+    edges_between,
     places_of_joints,
     supported_joints,
 )
@@ -21,7 +22,6 @@ from equimorph.structures.space_frame.member import (
     SpatialMember,
     SpatialMemberSpec,
     Stiffness,
-    member_of,
 )
 from equimorph.structures.space_frame.supports import (
     FREE,
@@ -32,8 +32,6 @@ from equimorph.structures.space_frame.supports import (
     spatial_support,
 )
 from equimorph.structures.unit_system import UnitSystem
-
-WEIGHT = "weight"
 
 
 class Turning(IntEnum):
@@ -58,7 +56,7 @@ class Body:
 
 
 @dataclass(frozen=True, eq=False)
-class SpatialNetwork(Network):
+class SpatialNetwork(AnyFrameNetwork):
     """Joints in their places, the pieces of members between them, and their supports.
 
     owner: the member of each piece; made: the stiffness of each member.
@@ -68,16 +66,11 @@ class SpatialNetwork(Network):
     owner: Int[np.ndarray, " pieces"]
     made: tuple[Stiffness, ...]
     supports: tuple[SpatialSupport, ...]
-    edge: ClassVar[str] = "member"
-    whole: ClassVar[str] = "frames"
+    axes_of_turns: ClassVar[int] = 3
+    sizes_of_loads: ClassVar[tuple[int, ...]] = (3,)
 
     @cached_property
-    def edge_names(self) -> list[str]:
-        """Names of the pieces: the joints at their starts and ends, joined."""
-        return ["-".join(self.joints[end] for end in pair) for pair in self.ends.tolist()]
-
-    @cached_property
-    def drawn_lengths(self) -> Float[np.ndarray, " pieces"]:
+    def lengths(self) -> Float[np.ndarray, " pieces"]:
         """Lengths of the pieces as drawn."""
         chords = np.linalg.norm(self.chords, axis=1).tolist()
         pairs = zip(self.owner.tolist(), chords, strict=True)
@@ -90,7 +83,7 @@ class SpatialNetwork(Network):
         for m, member in enumerate(self.members):
             if member.length is not None:
                 mine = self.owner == m
-                found[mine] = float(member.length) / self.drawn_lengths[mine].sum() - 1.0
+                found[mine] = float(member.length) / self.lengths[mine].sum() - 1.0
         return found
 
     @cached_property
@@ -99,6 +92,14 @@ class SpatialNetwork(Network):
         pairs = zip(self.owner.tolist(), self.chords, strict=True)
         return np.stack([self.members[m].axes(chord) for m, chord in pairs])
 
+    def supports_data(self) -> list[dict[str, Any]]:
+        """Tables of the supports."""
+        return [dict(support.data) for support in self.supports]
+
+    def name_of_member(self, piece: int) -> str:
+        """Name of the member to which a piece belongs."""
+        return self.members[int(self.owner[piece])].name
+
     def pieces_of(self, name: str) -> list[tuple[int, float]]:
         """Pieces of a member, or the one of that name, with −1 where it is named backwards."""
         for m, member in enumerate(self.members):
@@ -106,15 +107,53 @@ class SpatialNetwork(Network):
                 return [(int(k), 1.0) for k in np.flatnonzero(self.owner == m)]
         return [self.place_of_edge(name)]
 
-    def end(self, member: str, joint: str) -> tuple[int, int]:
-        """Place of a piece in the list, and 0 for its start or 1 for its end at a joint."""
-        at, _ = self.place_of_edge(member)
-        names = self.edge_names[at].split("-")
-        if joint not in names:
+    @property
+    def bending(self) -> float:
+        """Mean stiffness against bending about b: the unit of bending stiffnesses."""
+        return float(np.mean([each.strain[2] for each in self.made]))
+
+    @property
+    def weights(self) -> Float[np.ndarray, " pieces"]:
+        """Weights per length; 0 where none is given."""
+        return np.array([self.made[m].weight or 0.0 for m in self.owner.tolist()])
+
+    @property
+    def turning_places(self) -> int:
+        """Bodies."""
+        return len(self.bodies)
+
+    def place_of_turn(self, joint: str) -> int:
+        """Body that a support turns; InputError if it turns none."""
+        return self.held_body(joint)
+
+    def check_move(self, joint: str, move: Float[np.ndarray, "3"], what: str) -> None:
+        """Refuse a move of a support along directions that it does not hold."""
+        if not self.supports[self.joint(joint)].holds(move):
+            written = ", ".join(f"{x:g}" for x in move)
             raise InputError(
-                f"`joint` must be an end of member {self.edge_names[at]}; got {joint!r}."
+                f"`{what}` must be along directions that the support of {joint} holds; got "
+                f"({written})."
             )
-        return at, names.index(joint)
+
+    def has_rigid_member(self, joint: int) -> bool:
+        """Whether a member is rigidly joined to a joint."""
+        return self._rigid[joint]
+
+    def bears(
+        self, forces: Float[np.ndarray, "joints 3"], couples: Float[np.ndarray, " joints"]
+    ) -> bool:
+        """Whether supports alone bear a load on the joints."""
+        del couples
+        pairs = zip(self.supports, forces, strict=True)
+        return all(
+            support.holds(force) and bool(np.isinf(support.stiffness).all())
+            for support, force in pairs
+            if force.any()
+        )
+
+    def signs_of_strains(self, direction: float) -> Float[np.ndarray, "3"]:
+        """From the other end the tangent and the binormal are reversed, the normal is not."""
+        return np.array([1.0, direction, 1.0])
 
     # --- bodies ---------------------------------------------------------------------------------
 
@@ -236,27 +275,15 @@ def spatial_network(
         not reach, impossible hinges, unknown supports, or joints that are not connected.
     """
     names, places = places_of_joints(joints, system, (3,), reserved=(WEIGHT,))
-    made = tuple(member_of(each).measured(system) for each in members)
-    pairs, owner = [], []
-    for m, member in enumerate(made):
-        for joint in member.joints:
-            if joint not in names:
-                raise InputError(
-                    f"`joints` of member {member.name} must be joints ({', '.join(names)}); got "
-                    f"{joint}."
-                )
-        pairs += [[names.index(end) for end in pair] for pair in member.pieces]
-        owner += [m] * len(member.pieces)
+    made = tuple(SpatialMember.read(each).measured(system) for each in members)
+    ends, owner = edges_between(made, names)
     held = [NO_SUPPORT] * len(names)
     for at, joint, given in supported_joints(supports, names):
         held[at] = spatial_support(joint, given, system)
-    ends = np.array(pairs, dtype=int).reshape(-1, 2)
     stiff = tuple(each.stiffness(system) for each in made)
-    result = SpatialNetwork(
-        names, places, ends, made, np.array(owner, dtype=int), stiff, tuple(held)
-    )
+    result = SpatialNetwork(names, places, ends, made, owner, stiff, tuple(held))
     result.check()
-    assert result.drawn_lengths.all()  # arcs that do not reach are refused here
+    assert result.lengths.all()  # arcs that do not reach are refused here
     result.check_rotations()
     _check_coinciding(result)
     return result

@@ -1,6 +1,6 @@
 """Mechanics of a rod in space: its matrix, solves with it, and Newton steps, in batches."""
 
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -11,7 +11,7 @@ from equimorph.linalg.condensed import PIVOT_GUARD
 from equimorph.linalg.dense import no_border
 from equimorph.linalg.lanes import over_lanes
 from equimorph.linalg.sparse import SparseLayout
-from equimorph.structures.equations import Advance, Direction, JointEquations
+from equimorph.structures.equations import Advance, Direction, JointEquations, Solver
 from equimorph.structures.spatial.derivative_kernels import equations_lanes
 from equimorph.structures.spatial.lagrangian import (
     LENGTH_STIFFNESS,
@@ -237,17 +237,12 @@ class SpatialMechanics(SpatialLagrangian, JointEquations):
             determinant[unsafe], ratio[unsafe] = again.determinant, again.pivot_ratio
         return BorderedSolution(x, negative, ratio, unsafe, determinant)
 
-    def solve_with(
-        self,
-        parts: tuple[np.ndarray, ...],
-        z: Lanes,
-        p: Parameters,
-        rhs: Float[np.ndarray, "lanes sides bordered"],
-        border: Border | None,
-    ) -> BorderedSolution:
-        """Solve with F_z, bordered."""
+    def solver(
+        self, parts: tuple[np.ndarray, ...], z: Lanes, p: Parameters, shift: Values | None = None
+    ) -> Solver:
+        """Solves with F_z − shift·mass."""
         del parts
-        return self.solve(z, p, rhs, border)
+        return partial(self.solve, z, p, shift=shift)
 
     def index(self, z: Lanes, p: Parameters) -> Int[np.ndarray, " lanes"]:
         """Negative eigenvalues of the constrained Hessian, from the pivots of the fused step."""

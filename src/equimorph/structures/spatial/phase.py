@@ -20,7 +20,7 @@ from jaxtyping import Float
 from equimorph.arrays import Entries, Flags, Lanes, Parameters, Values
 from equimorph.errors import InputError
 from equimorph.linalg import Border, BorderedSolution
-from equimorph.structures.equations import Advance, Direction, Equations, LinearSystem
+from equimorph.structures.equations import Advance, Direction, Equations
 from equimorph.structures.spatial.mechanics import SpatialMechanics
 from equimorph.structures.spatial.model import ANGLES, SpatialModel
 from equimorph.structures.spatial.quaternions import (
@@ -295,15 +295,6 @@ class OrbitMechanics(SpatialMechanics):
         rest = super().advance(*(each[~there] for each in (z, p, dp, row, corner, defect)))
         return Advance(*(_merge(there, getattr(found, each.name), getattr(rest, each.name))
                          for each in fields(Advance)))  # fmt: skip
-
-    def linear_system(
-        self, z: Lanes, p: Parameters, directions: Float[np.ndarray, "lanes k parameters"]
-    ) -> LinearSystem:
-        """F, F_p along directions, and solves with F_z; computed together."""
-        system = super().linear_system(z, p, directions)
-        if not self.on_orbits(z, p).any():
-            return system
-        return replace(system, solve=partial(self.solve, z, p))
 
     def solve(
         self,

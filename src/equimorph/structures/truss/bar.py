@@ -1,24 +1,21 @@
 """Bars of a truss, and their energy by strain."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
-from typing import Annotated, Any, Literal
+from dataclasses import dataclass
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from jaxtyping import Float
 
 from equimorph.argument_checks import check_arguments
 from equimorph.argument_notes import TWO_NAMES
-from equimorph.structures.network import built
-from equimorph.structures.unit_system import Quantity, UnitSystem
-
-QUANTITIES = {"EA": "force", "EI": "force·length²", "rest": "length"}
-"""What each number of a bar measures."""
+from equimorph.structures.network import Edge
+from equimorph.structures.unit_system import Quantity
 
 
 @check_arguments
 @dataclass(frozen=True)
-class Bar:
+class Bar(Edge):
     """A straight bar between two joints, which it does not bend.
 
     Numbers are in the units of the truss; texts like "12 kN" are converted to these.
@@ -38,37 +35,23 @@ class Bar:
         a number in any system to which the units of force, length and time belong.
     """
 
+    edge: ClassVar[str] = "bar"
+    quantities: ClassVar[Mapping[str, str]] = {
+        "EA": "force",
+        "EI": "force·length²",
+        "rest": "length",
+    }
     ends: Annotated[Sequence[str], TWO_NAMES]
     EA: Quantity = 1.0
     EI: Quantity | None = None
     rest: Quantity | None = None
     mass: Quantity | None = None
 
-    @property
-    def name(self) -> str:
-        """Its joints, joined: A-B."""
-        return "-".join(self.ends)
-
-    def measured(self, system: UnitSystem) -> "Bar":
-        """The same bar with its numbers in a system of units."""
-        return system.measured(self, QUANTITIES, f"bar {self.name}")
-
-    def data(self) -> dict[str, Any]:
-        """Return what it is made from."""
-        given = {key: value for key, value in asdict(self).items() if value is not None}
-        return {**given, "ends": list(self.ends)}
-
 
 BarSpec = Annotated[
     Bar | Annotated[Sequence[str], TWO_NAMES] | Mapping[str, Any],
     "bars, pairs of different joints, or data of bars",
 ]
-
-
-def bar_of(given: BarSpec) -> Bar:
-    """Bar from a `Bar`, its data, or the names of its ends."""
-    return built(Bar, given, "bars")
-
 
 Strain = Literal["engineering", "green"]
 Values = Float[np.ndarray, "lanes bars"]

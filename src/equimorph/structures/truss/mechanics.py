@@ -8,12 +8,12 @@ from jaxtyping import Float, Int
 
 from equimorph.arrays import Entries, Flags, Lanes, Parameters, Values
 from equimorph.linalg.dense import multiply
-from equimorph.linalg.lanes import over_lanes
 from equimorph.linalg.sparse import SparseLayout
 from equimorph.model import Actuator, ActuatorKind, Drawing, Forces, Support, SupportKind
 from equimorph.model.drawing import supports_of_point
+from equimorph.structures.any_network import AnyNetwork
 from equimorph.structures.contract import Growth, Symmetry
-from equimorph.structures.discrete import DiscreteStructure, along_corners
+from equimorph.structures.discrete import along_corners, linearise
 from equimorph.structures.equations import Direction
 from equimorph.structures.images import edges_of_image, images, is_symmetry, parameter_exchange
 from equimorph.structures.truss.bar import Energies
@@ -30,7 +30,7 @@ SMALLEST = 0.02
 """Least size of guesses, relative to the truss."""
 
 
-class TrussMechanics(DiscreteStructure):
+class TrussMechanics(AnyNetwork):
     """Energy, forces, stiffness and drawing of a truss; `Truss` adds names and checks.
 
     Parameters
@@ -50,6 +50,7 @@ class TrussMechanics(DiscreteStructure):
     kind: ClassVar[str] = "truss"
     upward: ClassVar[str] = "z"
     constraints = 0
+    network: TrussNetwork
 
     def __init__(
         self,
@@ -60,17 +61,17 @@ class TrussMechanics(DiscreteStructure):
         system: UnitSystem,
     ) -> None:
         self.network, self.energies, self.rates, self.pulls = network, energies, rates, pulls
-        self.system, self.length_unit = system, system.label("length")
+        self.system = system
         self.unknowns = len(network.moves)
         self.mass = np.ones(self.unknowns)
 
     def spans(self, z: Lanes) -> Float[np.ndarray, "lanes bars space"]:
         """Vectors from the first to the second joint of every bar."""
-        return np.asarray(self._drawn + self._differences(z))
+        return np.asarray(self.network.chords + self._differences(z))
 
     def rest_lengths(self, p: Parameters) -> BarValues:
         """Lengths without stress."""
-        return np.asarray(self.network.rests + multiply(p, self.rates.T))
+        return np.asarray(self.network.lengths + multiply(p, self.rates.T))
 
     def lengths(self, z: Lanes, p: Parameters) -> tuple[BarValues, BarValues]:
         """Squares of the lengths, and the rest lengths."""
@@ -81,13 +82,14 @@ class TrussMechanics(DiscreteStructure):
         squared, rest = self.lengths(z, p)
         return np.asarray(1.0 - np.sqrt(squared) / rest)
 
-    @cached_property
-    def _drawn(self) -> Float[np.ndarray, "bars space"]:
-        return np.asarray(np.diff(self.network.places[self.network.ends], axis=1)[:, 0])
+    def moves_of(self, z: Lanes) -> Float[np.ndarray, "lanes joints space"]:
+        """Moves of all joints."""
+        moves = np.zeros((len(z), *self.network.held.shape))
+        moves[:, ~self.network.held] = z
+        return moves
 
     def _differences(self, u: Lanes) -> Float[np.ndarray, "lanes bars space"]:
-        full = np.zeros((len(u), *self.network.held.shape))
-        full[:, ~self.network.held] = u
+        full = self.moves_of(u)
         return np.asarray(np.diff(full[:, self.network.ends], axis=2)[:, :, 0])
 
     def _sum_at_joints(self, forces: Float[np.ndarray, "lanes bars space"]) -> Lanes:
@@ -101,7 +103,7 @@ class TrussMechanics(DiscreteStructure):
     @cached_property
     def _unknowns_of_bars(self) -> Int[np.ndarray, "bars both"]:
         pairs = self.network.unknowns[self.network.ends]
-        return np.asarray(pairs.reshape(len(self.network.bars), -1))
+        return np.asarray(pairs.reshape(len(self.network.members), -1))
 
     @cached_property
     def layout(self) -> SparseLayout:
@@ -123,26 +125,9 @@ class TrussMechanics(DiscreteStructure):
 
     def linearised(self, z: Lanes, p: Parameters, dp: Parameters) -> tuple[Lanes, Lanes, Entries]:
         """F, F_p·dp and the entries of F_z."""
-        residual, column = np.empty_like(z), np.empty_like(z)
-        entries = np.empty((len(z), len(self.layout.rows)))
-        bars = (self._unknowns_of_bars, self._slots, self._drawn, self.energies.stiffness)
-        shared = (*bars, self.network.rests, self.rates, self.pulls, self.energies.green)
-        given = [np.ascontiguousarray(array) for array in (z, p, dp)]
-        if len(z):
-            over_lanes(linearise_lanes, shared, given, [residual, column, entries])
-        return residual, column, entries
-
-    def residual(self, z: Lanes, p: Parameters) -> Lanes:
-        """Forces that are missing at the joints."""
-        return self.linearised(z, p, np.zeros_like(p))[0]
-
-    def parameter_derivative(self, z: Lanes, p: Parameters, dp: Parameters) -> Lanes:
-        """F_p·dp."""
-        return self.linearised(z, p, dp)[1]
-
-    def entries(self, z: Lanes, p: Parameters) -> Entries:
-        """Entries of the stiffness matrix, geometric part included."""
-        return self.linearised(z, p, np.zeros_like(p))[2]
+        bars = (self._unknowns_of_bars, self._slots, self.network.chords, self.energies.stiffness)
+        shared = (*bars, self.network.lengths, self.rates, self.pulls, self.energies.green)
+        return linearise(linearise_lanes, shared, self.layout, (z, p, dp))
 
     def energy(self, z: Lanes, p: Parameters) -> Values:
         """Strain energy of the bars, less the work of the loads."""
@@ -216,9 +201,12 @@ class TrussMechanics(DiscreteStructure):
 
     def joint_places(self, z: Lanes) -> Float[np.ndarray, "lanes joints space"]:
         """Places of the joints."""
-        full = np.repeat(self.network.places[None], len(z), axis=0)
-        full[:, ~self.network.held] += z
-        return full
+        return np.asarray(self.network.places + self.moves_of(z))
+
+    def displacements(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes joints space"]:
+        """Moves of the joints from where they are drawn."""
+        del p
+        return self.moves_of(z)
 
     def drawing(self, z: Lanes, p: Parameters) -> Drawing:
         """Supports of the joints, forces on them, and bars that change their length."""
@@ -233,12 +221,9 @@ class TrussMechanics(DiscreteStructure):
             elif held.any():
                 stiffness = np.where([*held, False], np.inf, 0.0)
                 supports += supports_of_point(stiffness, here, np.tile([1.0, 0.0], (len(z), 1)))
-        forces = np.zeros((len(p), *made.held.shape))
-        forces[:, ~made.held] = multiply(p, self.pulls)
+        forces = self.moves_of(multiply(p, self.pulls))
         moved = np.flatnonzero(self.rates.any(axis=1))
-        loaded = np.zeros(made.held.shape)
-        loaded[~made.held] = np.abs(self.pulls).sum(axis=0)
-        at = np.flatnonzero(loaded.any(axis=1))
+        at = np.flatnonzero(self.moves_of(self.pulls).any(axis=(0, 2)))
         return Drawing(
             tuple(supports),
             (Forces(places[:, at], forces[:, at]),) if len(at) else (),
@@ -270,9 +255,7 @@ def _image_parameters(
     if there is None or not np.array_equal(made.held[joints], made.held):
         return None
     heres, mapped = [], []
-    for rates, pulls in zip(truss.rates.T, truss.pulls, strict=True):
-        forces = np.zeros(made.held.shape)
-        forces[~made.held] = pulls
+    for rates, forces in zip(truss.rates.T, truss.moves_of(truss.pulls), strict=True):
         image, moved = np.zeros_like(forces), np.zeros_like(rates)
         image[joints], moved[there] = axes * forces, rates
         heres.append(np.append(forces, rates))
@@ -289,9 +272,8 @@ def _image(
     z: Lanes,
     p: Parameters,
 ) -> tuple[Lanes, Parameters]:
-    held = truss.network.held
-    moves = np.zeros((len(z), *held.shape))
-    moves[:, ~held] = z
+    moves = truss.moves_of(z)
     image = np.zeros_like(moves)
     image[:, joints] = axes * moves
-    return np.ascontiguousarray(image[:, ~held]), np.ascontiguousarray(signs * p[:, order])
+    unknown = image[:, ~truss.network.held]
+    return np.ascontiguousarray(unknown), np.ascontiguousarray(signs * p[:, order])

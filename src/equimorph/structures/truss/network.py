@@ -12,12 +12,12 @@ from equimorph.errors import InputError
 from equimorph.structures.network import (
     Joints,
     Network,
-    ends_of_edges,
+    edges_between,
     places_of_joints,
     supported_joints,
     vector,
 )
-from equimorph.structures.truss.bar import Bar, BarSpec, bar_of
+from equimorph.structures.truss.bar import Bar, BarSpec
 from equimorph.structures.unit_system import UnitSystem
 
 AXES = "xyz"
@@ -27,20 +27,10 @@ AXES = "xyz"
 class TrussNetwork(Network):
     """Joints in their places, which bars join them, and which of their moves are held."""
 
-    bars: tuple[Bar, ...]
+    members: tuple[Bar, ...]
     held: Bool[np.ndarray, "joints space"]
     edge: ClassVar[str] = "bar"
     whole: ClassVar[str] = "trusses"
-
-    @property
-    def edge_names(self) -> list[str]:
-        """Names of the bars."""
-        return [bar.name for bar in self.bars]
-
-    @property
-    def space(self) -> int:
-        """Two or three dimensions."""
-        return int(self.places.shape[1])
 
     @cached_property
     def unknowns(self) -> Int[np.ndarray, "joints space"]:
@@ -60,18 +50,15 @@ class TrussNetwork(Network):
 
     @cached_property
     def lengths(self) -> Float[np.ndarray, " bars"]:
-        """Distances of the joints of each bar, as drawn."""
-        return np.asarray(np.linalg.norm(self.chords, axis=1))
-
-    @cached_property
-    def rests(self) -> Float[np.ndarray, " bars"]:
         """Lengths of the bars at which they are free of stress."""
-        return np.array(
-            [
-                drawn if bar.rest is None else float(bar.rest)
-                for bar, drawn in zip(self.bars, self.lengths, strict=True)
-            ]
-        )
+        drawn = np.linalg.norm(self.chords, axis=1).tolist()
+        pairs = zip(self.members, drawn, strict=True)
+        return np.array([chord if bar.rest is None else float(bar.rest) for bar, chord in pairs])
+
+    def supports_data(self) -> list[str]:
+        """Held axes of the joints."""
+        rows = self.held.tolist()
+        return ["".join(x for x, fast in zip(AXES, row, strict=False) if fast) for row in rows]
 
     def bar(self, name: str) -> int:
         """Place of a bar in the list, whichever end is named first."""
@@ -112,8 +99,8 @@ def truss_network(
         supports, or if nothing can move.
     """
     names, places = places_of_joints(joints, system, (2, 3))
-    made = tuple(bar_of(each).measured(system) for each in bars)
-    ends = ends_of_edges(made, names, "bar")
+    made = tuple(Bar.read(each).measured(system) for each in bars)
+    ends, _ = edges_between(made, names)
     held = np.zeros(places.shape, bool)
     for at, joint, axes in supported_joints(supports, names):
         held[at, _held_axes(joint, axes, places.shape[1])] = True
@@ -136,7 +123,7 @@ def _check_supports(made: TrussNetwork) -> None:
     if made.held.all():
         raise InputError("`supports` must leave a joint free to move; got all of them held.")
     fast = np.asarray(made.held.all(axis=1))
-    for bar, (i, j) in zip(made.bars, made.ends, strict=True):
+    for bar, (i, j) in zip(made.members, made.ends, strict=True):
         if fast[i] and fast[j]:
             raise InputError(
                 f"`supports` must leave an end of every bar free; got bar {bar.name} with both "

@@ -2,28 +2,25 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from functools import cached_property
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from jaxtyping import Float
 
 from equimorph.argument_checks import check_arguments
-from equimorph.arrays import Lanes, Parameters
+from equimorph.arrays import Lanes, Parameters, Values
 from equimorph.errors import InputError
-from equimorph.model import Constraint, Descriptor, Parameter
+from equimorph.model import Constraint, Descriptor
 from equimorph.structures.contract import Product, Symmetry
 from equimorph.structures.discrete import correct_at_parameters
 from equimorph.structures.network import (
     Joints,
     check_parameter_names,
     direction_of_mechanism,
-    length_limits,
 )
-from equimorph.structures.truss import descriptors
 from equimorph.structures.truss.bar import BarSpec, Energies, Strain
-from equimorph.structures.truss.mechanics import COLLAPSED, TrussMechanics, symmetries
-from equimorph.structures.truss.network import AXES, TrussNetwork, truss_network
+from equimorph.structures.truss.mechanics import COLLAPSED, BarValues, TrussMechanics, symmetries
+from equimorph.structures.truss.network import TrussNetwork, truss_network
 from equimorph.structures.unit_system import Quantity, Units, unit_system
 from equimorph.tolerances import SINGULAR
 
@@ -110,9 +107,9 @@ class Truss(TrussMechanics):
     ) -> None:
         system = unit_system(units)
         made = truss_network(joints, bars, supports, system)
-        self._loads, self._actuators = dict(loads or {}), dict(actuators or {})
+        self._name_parameters(actuators, loads)
         check_parameter_names([*self._actuators, *self._loads])
-        stiffness = np.array([float(bar.EA) for bar in made.bars])
+        stiffness = np.array([float(bar.EA) for bar in made.members])
         energies = Energies(strain == "green", stiffness)
         rates = _rates(made, self._actuators)
         forces = [made.vector(each, f"loads.{name}") for name, each in self._loads.items()]
@@ -123,13 +120,7 @@ class Truss(TrussMechanics):
             np.array([*np.zeros((len(self._actuators), len(made.moves))), *forces]),
             system,
         )
-        self.parameters = (
-            *(
-                _actuator(name, made, rate, system.label("length"))
-                for name, rate in zip(self._actuators, rates.T, strict=True)
-            ),
-            *(Parameter(name, system.label("force"), 1.0, "load", 0.0) for name in self._loads),
-        )
+        self._set_parameters(self.rates.T)
         self._masses = dict(masses or {})
         self._set_masses()
         self._start = self._equilibrium()
@@ -140,7 +131,7 @@ class Truss(TrussMechanics):
         made, total = self.network, np.zeros(len(self.network.joints))
         for joint, mass in self._masses.items():
             total[made.joint(joint)] += self.system.mass(mass, f"masses.{joint}")
-        for bar, ends in zip(made.bars, made.ends, strict=True):
+        for bar, ends in zip(made.members, made.ends, strict=True):
             if bar.mass is not None:
                 total[ends] += 0.5 * self.system.mass(bar.mass, f"mass of bar {bar.name}")
         free = ~made.held
@@ -151,17 +142,6 @@ class Truss(TrussMechanics):
                 f"{made.joints[bare[0]]}."
             )
         self._nodal_masses = np.repeat(total[:, None], made.space, axis=1)[free]
-
-    @property
-    def time_unit(self) -> str:
-        """Seconds in a truss with units, else that of its numbers."""
-        return self.system.time_unit
-
-    def effort_unit(self, parameter: Parameter) -> str:
-        """Unit of the effort of a parameter, like N for a length."""
-        system = self.system
-        plain = system.plain
-        return super().effort_unit(parameter) if plain else system.conjugate(parameter.unit)
 
     @property
     def massless(self) -> str:
@@ -216,7 +196,7 @@ class Truss(TrussMechanics):
         stiff = -(columns * v).sum(axis=1) / rates
         along = (v, np.zeros_like(p))
         bend = np.abs((self.second_derivative(z, p, along, along) * v).sum(axis=1))
-        tenth = 0.1 * float(self.network.rests.mean())
+        tenth = 0.1 * float(self.network.lengths.mean())
         typical = min(tenth, float((2.0 * stiff / np.maximum(bend, TINY)).min()))
         self.mass = np.full(self.unknowns, typical**-2)
         self.parameters = tuple(
@@ -233,63 +213,87 @@ class Truss(TrussMechanics):
             f"({direction}) without force. Add a bar or a support."
         )
 
-    def identity(self) -> dict[str, Any]:
-        """Kind, and what the truss is made from."""
-        made = self.network
-        places = dict(zip(made.joints, made.places.tolist(), strict=True))
-        held = {
-            joint: "".join(axis for axis, fast in zip(AXES, row, strict=False) if fast)
-            for joint, row in zip(made.joints, made.held, strict=True)
-        }
-        return {
-            "kind": self.kind,
-            "joints": places,
-            "bars": [bar.data() for bar in made.bars],
-            "supports": {joint: axes for joint, axes in held.items() if axes},
-            "loads": {
-                name: {joint: [float(x) for x in force] for joint, force in forces.items()}
-                for name, forces in self._loads.items()
-            },
-            "actuators": {
-                name: {bar: float(rate) for bar, rate in rates.items()}
-                for name, rates in self._actuators.items()
-            },
-            "strain": "green" if self.energies.green else "engineering",
-            **({"masses": dict(self._masses)} if self._masses else {}),
-            **({} if self.system.plain else {"units": self.system.data()}),
-        }
+    def options(self) -> dict[str, Any]:
+        """Kind of strain, and masses at the joints."""
+        strain = "green" if self.energies.green else "engineering"
+        return {"strain": strain, **({"masses": dict(self._masses)} if self._masses else {})}
+
+    def quantity(self, k: int) -> str:
+        """Actuators are changes of length, loads are forces."""
+        return "length" if k < len(self._actuators) else "force"
 
     def natural_guess(self, p: Parameters) -> Lanes:
         """The state at rest."""
         return np.repeat(self._start[None], len(p), axis=0)
 
-    def symmetries(self) -> tuple[Symmetry, ...]:
-        """Mirror images and half turns that leave the truss as it is."""
-        return self._symmetries
-
-    @cached_property
-    def _symmetries(self) -> tuple[Symmetry, ...]:
+    def _find_symmetries(self) -> tuple[Symmetry, ...]:
         return symmetries(self)
+
+    # --- descriptors ----------------------------------------------------------------------------
+
+    written: ClassVar[Mapping[str, str]] = {
+        "force(bar)": "force",
+        "utilisation(bar)": "utilisation",
+        "max_utilisation": "max_utilisation",
+        "max_shortening": "max_shortening",
+        "displacement(joint, axis)": "displacement",
+        "travel(load)": "travel",
+        "effort(parameter)": "effort_of",
+        "energy": "total_energy",
+    }
 
     @check_arguments
     def force(self, bar: str) -> Descriptor:
         """Force in a bar, positive in tension."""
-        return descriptors.force(self, bar)
+        at = self.network.bar(bar)
+
+        def value(z: Lanes, p: Parameters) -> Values:
+            return self.energies.force(*self.lengths(z, p))[:, at].copy()
+
+        name = self.network.members[at].name
+        return self._make(f"force({name})", "force", value, f"N({name})")
+
+    def _utilisations(self, z: Lanes, p: Parameters) -> BarValues:
+        """Compression over the Euler load π² EI/l₀² [TimoshenkoGere1961]_; −∞ without EI."""
+        given = [np.nan if bar.EI is None else float(bar.EI) for bar in self.network.members]
+        squared, rest = self.lengths(z, p)
+        share = -self.energies.force(squared, rest) * rest**2 / (np.pi**2 * np.array(given))
+        return np.where(np.isnan(given), -np.inf, share)
 
     @check_arguments
     def utilisation(self, bar: str) -> Descriptor:
         """Compression of a bar over its Euler load π² EI/l₀²."""
-        return descriptors.utilisation(self, bar)
+        at = self.network.bar(bar)
+        name = self.network.members[at].name
+        if self.network.members[at].EI is None:
+            raise InputError(f"`utilisation({name})` must be of a bar with EI; got one without.")
+
+        def value(z: Lanes, p: Parameters) -> Values:
+            return self._utilisations(z, p)[:, at].copy()
+
+        return self._make(f"utilisation({name})", "1", value, f"U({name})")
 
     @property
     def max_utilisation(self) -> Descriptor:
         """Largest utilisation of the bars that have a bending stiffness."""
-        return descriptors.max_utilisation(self)
+        if all(bar.EI is None for bar in self.network.members):
+            raise InputError(
+                "`max_utilisation` must be of a truss with EI; got no bar that has one."
+            )
+
+        def value(z: Lanes, p: Parameters) -> Values:
+            return np.asarray(self._utilisations(z, p).max(axis=1))
+
+        return self._make("max_utilisation", "1", value, "max U")
 
     @property
     def max_shortening(self) -> Descriptor:
         """Largest shortening of a bar relative to its rest length, 1 − l/l₀."""
-        return descriptors.max_shortening(self)
+
+        def value(z: Lanes, p: Parameters) -> Values:
+            return np.asarray(self.shortenings(z, p).max(axis=1))
+
+        return self._make("max_shortening", "1", value, "max(1 − l/l₀)")
 
     @property
     def validity(self) -> tuple[Constraint, ...]:
@@ -299,37 +303,19 @@ class Truss(TrussMechanics):
     @check_arguments
     def displacement(self, joint: str, axis: str) -> Descriptor:
         """Displacement of a joint along an axis, from where it is drawn."""
-        return descriptors.displacement(self, joint, axis)
+        self.network.move(joint, axis)  # which has to be free
+        return super().displacement(joint, axis)
 
-    @check_arguments
-    def travel(self, load: str) -> Descriptor:
-        """Displacement along a load, work per unit of its parameter."""
-        return descriptors.travel(self, load)
-
-    @property
-    def elevation(self) -> Descriptor:
-        """The travel of the first load, or the first displacement."""
-        return descriptors.elevation(self)
-
-    @check_arguments
-    def descriptor(self, text: str) -> Descriptor:
-        """Return the descriptor written like ``force(A-B)`` or ``displacement(B, y)``."""
-        return descriptors.descriptor_from_text(self, text)
+    def first_move(self) -> Descriptor:
+        """The first displacement."""
+        return self.displacement(*self.network.moves[0].split("."))
 
 
 def _rates(made: TrussNetwork, actuators: Rates) -> Float[np.ndarray, "bars actuators"]:
-    rates = np.zeros((len(made.bars), len(actuators)))
+    rates = np.zeros((len(made.members), len(actuators)))
     for k, (name, given) in enumerate(actuators.items()):
         if not (given and all(given.values())):
             raise InputError(f"`actuators.{name}` must give rates by bar, not 0; got {given!r}.")
         for bar, rate in given.items():
             rates[made.bar(bar), k] = rate
     return rates
-
-
-def _actuator(
-    name: str, made: TrussNetwork, rates: Float[np.ndarray, " bars"], unit: str
-) -> Parameter:
-    """Actuator that may not take a rest length to zero."""
-    limits = length_limits(made.rests, rates)
-    return Parameter(name, unit, 1.0, "actuator", 0.0, *limits)

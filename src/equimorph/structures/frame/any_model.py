@@ -1,0 +1,106 @@
+"""The numbers that planar frames and frames in space have in common."""
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Self
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from equimorph.structures.frame.any_network import AnyFrameNetwork
+from equimorph.structures.frame.patterns import Patterns, patterns
+from equimorph.structures.rod.discretisation import Mesh, reference_element
+from equimorph.structures.unit_system import UnitSystem
+
+
+@dataclass(frozen=True, eq=False)
+class AnyFrameModel(ABC):
+    """Numbering of nodes and *scalars* y = (multipliers, p, 1), lengths, and loads.
+
+    Parameters
+    ----------
+    network
+        The frame as its user sees it.
+    patterns
+        What its parameters do, non-dimensional.
+    mesh
+        Elements of a piece of a member, of length 1.
+    length, bending
+        Units of length and of bending stiffness, in those of the user's `system`.
+    """
+
+    network: AnyFrameNetwork
+    patterns: Patterns
+    mesh: Mesh
+    length: float
+    bending: float
+    system: UnitSystem
+
+    @classmethod
+    def of(
+        cls,
+        network: AnyFrameNetwork,
+        effects: tuple[dict[str, Any], dict[str, Any]],
+        resolution: tuple[int, int],
+        system: UnitSystem,
+    ) -> Self:
+        """Model of a network, in units of the mean length of its pieces and the mean stiffness.
+
+        effects: of the actuators and of the loads, by name; resolution: elements, and their degree.
+        """
+        length, bending = float(network.lengths.mean()), network.bending
+        mesh = Mesh(np.linspace(0.0, 1.0, resolution[0] + 1), reference_element(resolution[1]))
+        found = patterns(network, *effects).scaled(length, bending)
+        return cls(network, found, mesh, length, bending, system)
+
+    @property
+    @abstractmethod
+    def multipliers(self) -> int:
+        """Number of forces that balance without loads."""
+
+    @property
+    def force(self) -> float:
+        """Unit of force."""
+        return self.bending / self.length**2
+
+    @property
+    def energy(self) -> float:
+        """Unit of energy and of couples."""
+        return self.bending / self.length
+
+    @property
+    def scalars(self) -> int:
+        """Number of multipliers and parameters, and 1 for the constant."""
+        return self.multipliers + self.patterns.count + 1
+
+    @property
+    def own(self) -> slice:
+        """Parameters among the scalars."""
+        return slice(self.multipliers, self.scalars - 1)
+
+    @property
+    @abstractmethod
+    def rows_of_nodes(self) -> Int[np.ndarray, "pieces nodes"]:
+        """Nodes along each piece, from start to end."""
+
+    @cached_property
+    def nodes(self) -> Int[np.ndarray, "elements order"]:
+        """Nodes of each element of each piece."""
+        return self.rows_of_nodes[:, self.mesh.element_nodes].reshape(-1, self.mesh.degree + 1)
+
+    @cached_property
+    def lengths(self) -> Float[np.ndarray, " pieces"]:
+        """Lengths of the pieces."""
+        return np.asarray(self.network.lengths / self.length)
+
+    @cached_property
+    def loads(self) -> Float[np.ndarray, "parameters joints space"]:
+        """Forces on the joints; a line load reaches the end of its piece.
+
+        The share of its start is what the cycles of the network decide.
+        """
+        found = self.patterns.forces.copy()
+        for k, end in enumerate(self.network.ends[:, 1].tolist()):
+            found[:, end] += self.patterns.lines[:, k] * self.lengths[k]
+        return found
