@@ -5,7 +5,7 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from functools import cached_property
 from itertools import pairwise
-from typing import Annotated, Any, ClassVar, Self
+from typing import Annotated, Any, ClassVar, TypeVar
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -14,6 +14,7 @@ from equimorph.argument_notes import NAME
 from equimorph.errors import InputError, suggestion
 from equimorph.structures.unit_system import Quantity, UnitSystem
 
+Part = TypeVar("Part", bound="Edge")
 Ends = Int[np.ndarray, "edges 2"]
 Places = Float[np.ndarray, "joints space"]
 Joints = Annotated[
@@ -186,7 +187,7 @@ class Edge:
         return "-".join(self.corners)
 
     @classmethod
-    def read(cls, given: Any) -> Self:
+    def read(cls: type[Part], given: Any) -> Part:
         """Itself, or one from its data or the names of its joints.
 
         Raises
@@ -205,7 +206,7 @@ class Edge:
             )
         return cls(**data)
 
-    def measured(self, system: UnitSystem) -> Self:
+    def measured(self: Part, system: UnitSystem) -> Part:
         """The same with its numbers in a system of units."""
         there = {key: of for key, of in self.quantities.items() if getattr(self, key) is not None}
         return system.measured(self, there, f"{self.edge} {self.name}")

@@ -3,7 +3,7 @@
 from abc import abstractmethod
 from dataclasses import replace
 from functools import cached_property
-from typing import Any, ClassVar, NamedTuple, NoReturn, Self
+from typing import Any, ClassVar, NamedTuple, NoReturn
 
 import numpy as np
 from jaxtyping import Float
@@ -170,11 +170,11 @@ class AnyFrame(AnyNetwork):
         )
 
     @abstractmethod
-    def guess_for(self, finer: Self, z: Lanes, p: Parameters) -> Lanes:
+    def guess_for(self, finer: Any, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes finer"]:
         """States as guesses of those of the same frame with other elements."""
 
     @cached_property
-    def refined(self) -> Self:
+    def refined(self) -> Any:
         """The same frame with elements of a degree higher by four."""
         data = {name: value for name, value in self.identity().items() if name != "kind"}
         return type(self)(**{**data, "degree": min(data["degree"] + FINER, HIGHEST)})

@@ -3,7 +3,7 @@
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Self
+from typing import Any, TypeVar
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -12,6 +12,8 @@ from equimorph.structures.frame.any_network import AnyFrameNetwork
 from equimorph.structures.frame.patterns import Patterns, patterns
 from equimorph.structures.rod.discretisation import Mesh, reference_element
 from equimorph.structures.unit_system import UnitSystem
+
+Model = TypeVar("Model", bound="AnyFrameModel")
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,12 +41,12 @@ class AnyFrameModel(ABC):
 
     @classmethod
     def of(
-        cls,
+        cls: type[Model],
         network: AnyFrameNetwork,
         effects: tuple[dict[str, Any], dict[str, Any]],
         resolution: tuple[int, int],
         system: UnitSystem,
-    ) -> Self:
+    ) -> Model:
         """Model of a network, in units of the mean length of its pieces and the mean stiffness.
 
         effects: of the actuators and of the loads, by name; resolution: elements, and their degree.

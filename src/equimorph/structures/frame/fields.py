@@ -1,7 +1,7 @@
 """Places, turns, forces and curvatures of a frame."""
 
 from functools import cached_property
-from typing import ClassVar, Self
+from typing import Any, ClassVar
 
 import numpy as np
 from jaxtyping import Float
@@ -149,7 +149,7 @@ class FrameFields(FrameMechanics, AnyFrame):
         starts = [each.start[: self.constraints] for each in self.model.forces]
         return np.stack([forces @ each for each in starts], axis=1)
 
-    def guess_for(self, finer: Self, z: Lanes, p: Parameters) -> Lanes:
+    def guess_for(self, finer: Any, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes finer"]:
         """States as guesses of those of the same frame with other elements."""
         model, fine = self.model, finer.model
         matrix = model.mesh.interpolation(fine.mesh.nodes)

@@ -1,7 +1,7 @@
 """Places, rotations, forces and curvatures of a frame in space."""
 
 from functools import cached_property
-from typing import ClassVar, Self
+from typing import Any, ClassVar
 
 import numpy as np
 from jaxtyping import Float
@@ -182,7 +182,7 @@ class SpatialFrameFields(SpatialFrameMechanics, AnyFrame):
         starts = self.model.forces.members[: self.constraints]
         return np.asarray(np.einsum("s,ska->ka", forces, starts))
 
-    def guess_for(self, finer: Self, z: Lanes, p: Parameters) -> Lanes:
+    def guess_for(self, finer: Any, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes finer"]:
         """States as guesses of those of the same frame with other elements."""
         model, fine = self.model, finer.model
         matrix = model.mesh.interpolation(fine.mesh.nodes)
