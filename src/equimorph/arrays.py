@@ -21,6 +21,8 @@ Entries = Float[np.ndarray, "lanes entries"]
 """Entries of the KKT matrix in the layout of its structure."""
 Scalars = Float[np.ndarray, "lanes scalars"]
 """Several scalars a lane."""
+Sides = Float[np.ndarray, "lanes sides bordered"]
+"""Right-hand sides of bordered systems, several a lane."""
 Settings = Float[np.ndarray, "lanes 2"]
 """Two parameters a lane."""
 Frames = Float[np.ndarray, "lanes d full"]

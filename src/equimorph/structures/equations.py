@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 from jaxtyping import Float, Int
 
-from equimorph.arrays import Lanes, Parameters, Values
+from equimorph.arrays import Lanes, Parameters, Sides, Values
 from equimorph.linalg import Border, BorderedSolution
 
 Direction = tuple[Lanes, Parameters]
@@ -34,7 +34,11 @@ class Advance:
     determinant: Values
 
 
-Solver = Callable[[Float[np.ndarray, "lanes sides bordered"], Border | None], BorderedSolution]
+AnyBorder = Border | None
+"""Columns, rows and corner around a matrix, or none."""
+Shift = Values | None
+"""Shift of the spectrum in each lane, or none."""
+Solver = Callable[[Sides, AnyBorder], BorderedSolution]
 
 
 @dataclass(frozen=True)
@@ -94,13 +98,8 @@ class Equations(ABC):
         return None
 
     @abstractmethod
-    def solve(  # the bordered system has this many parts
-        self,
-        z: Lanes,
-        p: Parameters,
-        rhs: Float[np.ndarray, "lanes sides bordered"],
-        border: Border | None = None,
-        shift: Values | None = None,
+    def solve(
+        self, z: Lanes, p: Parameters, rhs: Sides, border: AnyBorder = None, shift: Shift = None
     ) -> BorderedSolution:
         """Solve with the KKT matrix F_z − shift·mass, bordered by (columns, rows, corner).
 
@@ -149,7 +148,7 @@ class JointEquations(Equations):
 
     @abstractmethod
     def solver(
-        self, parts: tuple[np.ndarray, ...], z: Lanes, p: Parameters, shift: Values | None = None
+        self, parts: tuple[np.ndarray, ...], z: Lanes, p: Parameters, shift: Shift = None
     ) -> Solver:
         """Solves with F_z − shift·mass, given by the parts of F_z."""
 
@@ -162,12 +161,7 @@ class JointEquations(Equations):
         return self.linearised(z, p, dp)[1]
 
     def solve(
-        self,
-        z: Lanes,
-        p: Parameters,
-        rhs: Float[np.ndarray, "lanes sides bordered"],
-        border: Border | None = None,
-        shift: Values | None = None,
+        self, z: Lanes, p: Parameters, rhs: Sides, border: AnyBorder = None, shift: Shift = None
     ) -> BorderedSolution:
         """Solve with F_z − shift·mass, bordered."""
         return self.solver(self.parts(z, p), z, p, shift)(rhs, border)

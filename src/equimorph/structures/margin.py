@@ -10,9 +10,10 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from jaxtyping import Float
 
-from equimorph.arrays import Flags, Lanes, Parameters, Values
+from equimorph.arrays import Flags, Lanes, Parameters, Sides, Values
 from equimorph.linalg import BorderedSolution
 from equimorph.linalg.lanes import in_background, threads
+from equimorph.structures.equations import Shift
 
 RELATIVE = 1e-11
 """Relative change of an eigenvalue at which an iteration ends."""
@@ -44,9 +45,9 @@ class Pencil(Protocol):
         self,
         z: Lanes,
         p: Parameters,
-        rhs: Float[np.ndarray, "lanes sides bordered"],
+        rhs: Sides,
         border: Any = None,
-        shift: Values | None = None,
+        shift: Shift = None,
     ) -> BorderedSolution:
         """Solve with the second variation − shift · mass; `negative` counts its eigenvalues."""
 

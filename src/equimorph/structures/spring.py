@@ -9,9 +9,9 @@ import numpy as np
 from jaxtyping import Float
 
 from equimorph.argument_checks import check_arguments
-from equimorph.arrays import Flags, Lanes, Parameters, Values
+from equimorph.arrays import Flags, Lanes, Parameters, Sides, Values
 from equimorph.errors import InputError, suggestion
-from equimorph.linalg import Border, BorderedSolution, no_border, solve_bordered
+from equimorph.linalg import BorderedSolution, no_border, solve_bordered
 from equimorph.model import (
     Descriptor,
     Drawing,
@@ -21,7 +21,7 @@ from equimorph.model import (
     SupportKind,
 )
 from equimorph.structures.contract import Structure, Symmetry
-from equimorph.structures.equations import Direction, Majorant
+from equimorph.structures.equations import AnyBorder, Direction, Majorant, Shift
 from equimorph.structures.states import State, natural_state
 
 Term = tuple[float, dict[str, int]]
@@ -189,12 +189,7 @@ class Spring(Structure):
         return np.stack([by_x, x * np.tan(delta), 0.5 * stretch**2], axis=1)
 
     def solve(
-        self,
-        z: Lanes,
-        p: Parameters,
-        rhs: Float[np.ndarray, "lanes sides bordered"],
-        border: Border | None = None,
-        shift: Values | None = None,
+        self, z: Lanes, p: Parameters, rhs: Sides, border: AnyBorder = None, shift: Shift = None
     ) -> BorderedSolution:
         """Solve with E'' − shift, bordered."""
         hessian = self._hessian(z, p) - (0.0 if shift is None else shift)

@@ -11,13 +11,20 @@ from jaxtyping import Float, Int
 
 from equimorph.argument_checks import check_arguments
 from equimorph.argument_vocabulary import SHARE
-from equimorph.arrays import Flags, Lanes, Parameters, Values
+from equimorph.arrays import Flags, Lanes, Parameters, Sides, Values
 from equimorph.errors import InputError, suggestion
-from equimorph.linalg import Border, BorderedSolution
+from equimorph.linalg import BorderedSolution
 from equimorph.model import Descriptor
 from equimorph.structures.approach import smooth_arcs
 from equimorph.structures.contract import Symmetry
-from equimorph.structures.equations import Advance, Direction, LinearSystem, Majorant
+from equimorph.structures.equations import (
+    Advance,
+    AnyBorder,
+    Direction,
+    LinearSystem,
+    Majorant,
+    Shift,
+)
 from equimorph.structures.rod.centreline import Centreline, closest_approach, stations
 from equimorph.structures.rod.discretisation import Mesh
 from equimorph.structures.rod.heavy_rod import HeavyRod
@@ -160,12 +167,7 @@ class AnyRod(HeavyRod):
         return self.mechanics.effort(z, p)
 
     def solve(
-        self,
-        z: Lanes,
-        p: Parameters,
-        rhs: Float[np.ndarray, "lanes sides bordered"],
-        border: Border | None = None,
-        shift: Values | None = None,
+        self, z: Lanes, p: Parameters, rhs: Sides, border: AnyBorder = None, shift: Shift = None
     ) -> BorderedSolution:
         """Solve with F_z − shift·mass, bordered."""
         return self.mechanics.solve(z, p, rhs, border, shift)

@@ -6,11 +6,18 @@ from functools import cached_property, partial
 import numpy as np
 from jaxtyping import Float
 
-from equimorph.arrays import Lanes, Nodal, Parameters, Values
-from equimorph.linalg import Border, BorderedSolution, CondensedLayout, multiply, no_border
+from equimorph.arrays import Lanes, Nodal, Parameters, Sides, Values
+from equimorph.linalg import BorderedSolution, CondensedLayout, multiply, no_border
 from equimorph.linalg.lanes import over_lanes
 from equimorph.structures.contract import Symmetry
-from equimorph.structures.equations import Advance, Direction, LinearSystem, Majorant
+from equimorph.structures.equations import (
+    Advance,
+    AnyBorder,
+    Direction,
+    LinearSystem,
+    Majorant,
+    Shift,
+)
 from equimorph.structures.rod.clamped_derivative_kernels import (
     linearise_lanes,
     matrix_lanes,
@@ -95,7 +102,7 @@ class ClampedMechanics(PlanarMechanics):
         return self.recovery.largest_curvature(z, p)
 
     def kkt(
-        self, z: Lanes, p: Parameters, shift: Values | None = None
+        self, z: Lanes, p: Parameters, shift: Shift = None
     ) -> tuple[Nodal, Float[np.ndarray, "lanes 2 nodes"]]:
         """F_z − shift·mass as `layout` takes it: diagonal to add to the stiffness, constraints."""
         z, p = self.check_widths((z, p))
@@ -155,12 +162,7 @@ class ClampedMechanics(PlanarMechanics):
         return inextensible_inertia(self.mesh, self.nodal_angles(z, p))[:, 1:-1, 1:-1]
 
     def solve(
-        self,
-        z: Lanes,
-        p: Parameters,
-        rhs: Float[np.ndarray, "lanes sides bordered"],
-        border: Border | None = None,
-        shift: Values | None = None,
+        self, z: Lanes, p: Parameters, rhs: Sides, border: AnyBorder = None, shift: Shift = None
     ) -> BorderedSolution:
         """Solve with F_z − shift·mass, bordered."""
         return self._solve(*self.kkt(z, p, shift), rhs, border)
@@ -182,8 +184,8 @@ class ClampedMechanics(PlanarMechanics):
         self,
         diagonal: Nodal,
         gradients: Float[np.ndarray, "lanes 2 nodes"],
-        rhs: Float[np.ndarray, "lanes sides bordered"],
-        border: Border | None,
+        rhs: Sides,
+        border: AnyBorder,
     ) -> BorderedSolution:
         """Solve with F_z, given by its parts, bordered."""
         around = no_border(len(rhs), self.size) if border is None else border

@@ -5,12 +5,19 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float
 
-from equimorph.arrays import Flags, Lanes, Nodal, Parameters, Scalars, Values
-from equimorph.linalg import Border, BorderedSolution, CondensedLayout, no_border
+from equimorph.arrays import Flags, Lanes, Nodal, Parameters, Scalars, Sides, Values
+from equimorph.linalg import BorderedSolution, CondensedLayout, no_border
 from equimorph.linalg.lanes import over_lanes
 from equimorph.linalg.sparse import SparseLayout
 from equimorph.structures.contract import Symmetry
-from equimorph.structures.equations import Advance, Direction, JointEquations, Solver
+from equimorph.structures.equations import (
+    Advance,
+    AnyBorder,
+    Direction,
+    JointEquations,
+    Shift,
+    Solver,
+)
 from equimorph.structures.rod.discretisation import Reference
 from equimorph.structures.rod.fields import GeneralFields
 from equimorph.structures.rod.general_kernels import linearise_lanes, second_lanes
@@ -251,7 +258,7 @@ class GeneralMechanics(JointEquations, PlanarMechanics):
         return out
 
     def solver(
-        self, parts: tuple[np.ndarray, ...], z: Lanes, p: Parameters, shift: Values | None = None
+        self, parts: tuple[np.ndarray, ...], z: Lanes, p: Parameters, shift: Shift = None
     ) -> Solver:
         """Solves with F_z − shift·mass; under pressure every angle works on every other."""
         diagonal, gradients, trailing = parts
@@ -261,9 +268,7 @@ class GeneralMechanics(JointEquations, PlanarMechanics):
             entries = self._pressed_entries(self._area, z, p, diagonal, gradients, trailing)
             return lambda rhs, border: self._full_layout.solve(entries, border, rhs)
 
-        def solve(
-            rhs: Float[np.ndarray, "lanes sides bordered"], border: Border | None
-        ) -> BorderedSolution:
+        def solve(rhs: Sides, border: AnyBorder) -> BorderedSolution:
             around = no_border(len(z), self.size) if border is None else border
             return self.layout.solve(diagonal, gradients, *around, rhs, trailing=trailing)
 

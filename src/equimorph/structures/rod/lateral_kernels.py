@@ -251,13 +251,10 @@ def _start(columns, unknowns, sides, carried, products):
     for i in range(unknowns):
         for slot in range(SIDE + sides, TILE):
             store(columns, i * TILE + slot, zero)
-    for i in range(2 * TILE):
-        store(carried, i, zero)
+    carried[:], products[:] = 0.0, 0.0
     for v in range(2):
         for slot in range(SIDE, TILE):
             store(carried, v * TILE + slot, load(columns, v * TILE + slot))
-    for i in range(4):
-        store(products, i, zero)
 
 
 @njit(**INNER)

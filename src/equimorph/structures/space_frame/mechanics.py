@@ -6,12 +6,12 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
-from equimorph.arrays import Entries, Flags, Lanes, Parameters, Values
-from equimorph.linalg import Border, BorderedSolution
+from equimorph.arrays import Entries, Flags, Lanes, Parameters, Sides, Values
+from equimorph.linalg import BorderedSolution
 from equimorph.linalg.dense import no_border
 from equimorph.linalg.sparse import SparseLayout
 from equimorph.structures.discrete import linearise
-from equimorph.structures.equations import JointEquations, Solver
+from equimorph.structures.equations import AnyBorder, JointEquations, Shift, Solver
 from equimorph.structures.space_frame.kernels import linearise_lanes
 from equimorph.structures.space_frame.lagrangian import SpatialFrameLagrangian
 from equimorph.structures.space_frame.model import SpatialFrameModel
@@ -56,7 +56,7 @@ class SpatialFrameMechanics(SpatialFrameLagrangian, JointEquations):
     # --- contract -------------------------------------------------------------------------------
 
     def linearised(
-        self, z: Lanes, p: Parameters, dp: Parameters, shift: Values | None = None
+        self, z: Lanes, p: Parameters, dp: Parameters, shift: Shift = None
     ) -> tuple[np.ndarray, ...]:
         """F, F_p·dp, and the entries of F_z − shift·mass in rotations with F and the shift."""
         lowered = np.zeros(len(z)) if shift is None else shift
@@ -76,19 +76,14 @@ class SpatialFrameMechanics(SpatialFrameLagrangian, JointEquations):
         return *out, out[0], lowered
 
     def solve(
-        self,
-        z: Lanes,
-        p: Parameters,
-        rhs: Float[np.ndarray, "lanes sides bordered"],
-        border: Border | None = None,
-        shift: Values | None = None,
+        self, z: Lanes, p: Parameters, rhs: Sides, border: AnyBorder = None, shift: Shift = None
     ) -> BorderedSolution:
         """Solve with the KKT matrix F_z − shift·mass, bordered, by sparse LDLᵀ."""
         parts = self.linearised(z, p, np.zeros_like(p), shift)[2:]
         return self.solver(parts, z, p)(rhs, border)
 
     def solver(
-        self, parts: tuple[np.ndarray, ...], z: Lanes, p: Parameters, shift: Values | None = None
+        self, parts: tuple[np.ndarray, ...], z: Lanes, p: Parameters, shift: Shift = None
     ) -> Solver:
         """Solves with the matrix whose parts are given, which is reduced to rotations."""
         assert shift is None, "the parts contain it"
@@ -127,8 +122,8 @@ class SpatialFrameMechanics(SpatialFrameLagrangian, JointEquations):
         self,
         at: Coordinates,
         entries: Entries,
-        rhs: Float[np.ndarray, "lanes sides bordered"],
-        border: Border | None,
+        rhs: Sides,
+        border: AnyBorder,
     ) -> BorderedSolution:
         """Solve with the matrix of these entries, which is reduced to rotations."""
         around = no_border(len(rhs), self.size) if border is None else border

@@ -8,7 +8,7 @@ import numpy as np
 from equimorph.linalg.compiled import njit
 from equimorph.linalg.kernels import INNER
 from equimorph.linalg.simd import absolute, load, spread, store, where_less
-from equimorph.structures.spatial.element_kernels import BORDER, COLUMN, FORCE, ROW
+from equimorph.structures.spatial.force_kernels import BORDER, COLUMN, FORCE, ROW
 from equimorph.structures.spatial.node_kernels import (
     COUNT,
     EXCESS,

@@ -27,7 +27,7 @@ from equimorph.structures.spatial.derivative_kernels import (
     stretches_of,
     turn_end,
 )
-from equimorph.structures.spatial.element_kernels import turn_axes
+from equimorph.structures.spatial.force_kernels import turn_axes
 from equimorph.structures.spatial.jet_kernels import (
     add,
     clear,

@@ -33,15 +33,7 @@ LARGEST_TAIL = 5e-4
 FORCES = 8.0
 """Spread of the support forces of random guesses."""
 
-BLOCK = 64
-"""Lanes computed together: their arrays stay in the cache."""
-
 Nodes = Float[np.ndarray, "lanes nodes 4"]
-
-
-def blocks_of(lanes: int) -> list[slice]:
-    """Slices of at most `BLOCK` lanes; an empty one for no lanes."""
-    return [slice(start, start + BLOCK) for start in range(0, max(lanes, 1), BLOCK)]
 
 
 class SpatialLagrangian(RodMechanics):

@@ -3,23 +3,28 @@
 from functools import cached_property, partial
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Int
 
-from equimorph.arrays import Entries, Lanes, Parameters, Values
-from equimorph.linalg import Border, BorderedSolution
+from equimorph.arrays import Entries, Lanes, Parameters, Sides, Values
+from equimorph.linalg import BorderedSolution
 from equimorph.linalg.condensed import PIVOT_GUARD
 from equimorph.linalg.dense import no_border
 from equimorph.linalg.lanes import over_lanes
 from equimorph.linalg.sparse import SparseLayout
-from equimorph.structures.equations import Advance, Direction, JointEquations, Solver
+from equimorph.structures.equations import (
+    Advance,
+    AnyBorder,
+    Direction,
+    JointEquations,
+    Shift,
+    Solver,
+)
 from equimorph.structures.spatial.derivative_kernels import equations_lanes
 from equimorph.structures.spatial.lagrangian import (
     LENGTH_STIFFNESS,
-    Nodes,
     SpatialLagrangian,
-    blocks_of,
 )
-from equimorph.structures.spatial.quaternions import FRAME, RIGHT, Jet, normalised
+from equimorph.structures.spatial.quaternions import Jet
 from equimorph.structures.spatial.solve_kernels import solve_bordered_lanes
 from equimorph.structures.spatial.step_kernels import advance_lanes
 from equimorph.structures.spatial.tables import equation_tables, pairs_of, step_tables
@@ -31,146 +36,50 @@ class SpatialMechanics(SpatialLagrangian, JointEquations):
     @cached_property
     def layout(self) -> SparseLayout:
         """Sparsity of F_z: dense blocks of elements, and a border."""
-        rows, columns = (np.concatenate(each) for each in zip(*self._places, strict=True))
-        keys = np.unique(rows * self.size + columns)
-        return SparseLayout(keys // self.size, keys % self.size, self.size, self.constraints)
+        first, size = self.model.unknown_nodes.start, self.size
+        unknowns = (4 * (self.mesh.element_nodes - first))[:, :, None] + np.arange(4)
+        blocks = unknowns.reshape(self.mesh.elements, -1)
+        rows = np.repeat(blocks, blocks.shape[1], axis=1)
+        columns = np.tile(blocks, blocks.shape[1])
+        inside = (rows < self.unknowns) & (columns <= rows) & (columns >= 0)
+        border = np.arange(self.unknowns * size, size * size)
+        border = border[border // size >= border % size]
+        keys = np.unique(np.concatenate([rows[inside] * size + columns[inside], border]))
+        return SparseLayout(keys // size, keys % size, size, self.constraints)
 
     @cached_property
-    def _places(self) -> list[tuple[Int[np.ndarray, " some"], Int[np.ndarray, " some"]]]:
-        """Rows and columns, row ≥ column, of the blocks of the elements, then of the border."""
-        first, count = self.model.unknown_nodes.start, self.unknowns // 4
-        found = []
-        for nodes in self.mesh.element_nodes:
-            at = (4 * (nodes - first))[:, None] + np.arange(4)
-            at = at[(nodes >= first) & (nodes < first + count)].ravel()
-            rows, columns = np.meshgrid(at, at, indexing="ij")
-            low = rows >= columns
-            found.append((rows[low], columns[low]))
-        m = np.arange(self.unknowns, self.size)
-        rows, columns = np.meshgrid(m, np.arange(self.size), indexing="ij")
-        low = rows >= columns
-        return [*found, (rows[low], columns[low])]
+    def _groups(self) -> Int[np.ndarray, " size"]:
+        """Groups of columns of F_z: inner nodes by their place in elements, vertices, multipliers.
 
-    @cached_property
-    def _slots(self) -> list[Int[np.ndarray, " some"]]:
-        """Numbers of the entries of each of `_places`."""
-        keys = self.layout.rows * self.size + self.layout.columns
-        return [np.searchsorted(keys, r * self.size + c) for r, c in self._places]
+        Two columns of a group have no rows of this or an earlier group in common: inner nodes of
+        different elements work on vertices only, and of three vertices in a row each has its group.
+        """
+        nodes = np.arange(self.unknowns // 4) + self.model.unknown_nodes.start
+        inner, vertex = nodes % self.mesh.degree, nodes // self.mesh.degree
+        own = np.where(inner > 0, inner - 1, self.mesh.degree - 1 + vertex % 3)
+        groups = (4 * own[:, None] + np.arange(4)).ravel()
+        last = 4 * (self.mesh.degree + 2)
+        return np.concatenate([groups, last + np.arange(self.constraints)])
 
-    def entries(self, z: Lanes, p: Parameters, shift: Values | None = None) -> Entries:
-        """Entries of F_z − shift·mass in the order of `layout`."""
-        moved = np.zeros(len(z)) if shift is None else shift
-        parts = [self._entries(z[at], p[at], moved[at]) for at in blocks_of(len(z))]
-        return np.concatenate(parts)
+    def entries(self, z: Lanes, p: Parameters, shift: Shift = None) -> Entries:
+        """Entries of F_z − shift·mass in the order of `layout`, by derivatives along directions.
 
-    def _entries(self, z: Lanes, p: Parameters, shift: Values) -> Entries:
-        """`entries` of one block of lanes."""
-        given, y = self.jets(z, p)
-        q, inverse, square = (jet[0] for jet in normalised(given))
-        blocks, crossing, closing = self._second(q, y)
-        slope = self.slope(q[None], y)[0]
-        projector = (np.eye(4) - q[..., :, None] * q[..., None, :]) * inverse[..., None, None]
-        nodes = self.mesh.element_nodes
-        p_left = projector[:, nodes]
-        blocks = np.einsum("leiab,leibjc,lejcd->leiajd", p_left, blocks, p_left, optimize=True)
-        own = self._own_blocks(given[0], q, inverse, square, slope)
-        border = np.einsum("lmia,liab->lmib", crossing, projector)
-        return self._place_entries(blocks, own, border, closing, shift)
-
-    def _own_blocks(
-        self, given: Nodes, q: Nodes, inverse: np.ndarray, square: np.ndarray, slope: Nodes
-    ) -> Float[np.ndarray, "lanes nodes 4 4"]:
-        """Blocks of the nodes by the change of directions and lengths."""
-        along = (q * slope).sum(axis=-1)[..., None, None]
-        across = slope - along[..., 0] * q
-        mixed = across[..., :, None] * q[..., None, :]
-        unit = np.eye(4)
-        own = along * (unit - q[..., :, None] * q[..., None, :])
-        own = -(own + mixed + np.swapaxes(mixed, -1, -2)) * (inverse**2)[..., None, None]
-        inner = self.model.unknown_nodes
-        excess = square[:, inner, None, None] - 1.0
-        outer = given[:, inner, :, None] * given[:, inner, None, :]
-        own[:, inner] += 0.5 * self.stiff_lengths[:, None, None] * (excess * unit + 2.0 * outer)
-        return np.asarray(own)
-
-    def _place_entries(
-        self,
-        blocks: np.ndarray,
-        own: np.ndarray,
-        border: np.ndarray,
-        closing: np.ndarray,
-        shift: Values,
-    ) -> Entries:
-        """Write blocks of elements and nodes, and the border, to their entries."""
-        lanes, inner = len(blocks), self.model.unknown_nodes
-        out = np.zeros((lanes, len(self.layout.rows)))
-        count = len(self.mesh.nodes)
-        free = np.zeros(count, bool)
-        free[inner] = True
-        for e, nodes in enumerate(self.mesh.element_nodes):
-            mine = np.repeat(free[nodes], 4)
-            block = blocks[:, e].reshape(lanes, len(mine), len(mine))[:, mine][:, :, mine]
-            low = np.tril_indices(block.shape[1])
-            out[:, self._slots[e]] += block[:, low[0], low[1]]
-        slots = self._node_slots
-        own = own[:, inner]
-        own[:, :, range(4), range(4)] -= shift[:, None, None] * self.mass.reshape(-1, 4)
-        low = np.tril_indices(4)
-        out[:, slots] += own[:, :, low[0], low[1]]
-        m = self.constraints
-        rows = np.zeros((lanes, m, self.size))
-        rows[:, :, : self.unknowns] = border[:, :, inner].reshape(lanes, m, self.unknowns)
-        rows[:, :, self.unknowns :] = closing
-        r, c = self._places[-1]
-        out[:, self._slots[-1]] = rows[:, r - self.unknowns, c]
-        return out
-
-    @cached_property
-    def _node_slots(self) -> Int[np.ndarray, "nodes 10"]:
-        """Numbers of the entries of the lower triangle of each node."""
-        keys = self.layout.rows * self.size + self.layout.columns
-        first = 4 * np.arange(self.unknowns // 4)[:, None]
-        row, column = np.tril_indices(4)
-        return np.searchsorted(keys, (first + row) * self.size + first + column)
-
-    def _second(
-        self, q: Nodes, y: Float[np.ndarray, "1 lanes scalars"]
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Second derivatives of L by unit quaternions of elements, by these and λ, and by λ."""
-        turned, moved, strain = (jet[0] for jet in self.element_strains(q[None]))
-        local = q[:, self.mesh.element_nodes]
-        weights, model, m = self.weights[..., None], self.model, self.constraints
-        order = local.shape[2]
-        jacobian = 2.0 * np.einsum("eij,leika->leikja", self.slopes, turned)
-        own = -2.0 * np.einsum("kab,leib->leika", RIGHT, moved)
-        i = np.arange(order)
-        jacobian[:, :, i, :, i] += np.moveaxis(own, 2, 0)
-        torsion = np.einsum("ls,sei->lei", y[0], model.torsion)
-        stiff = np.repeat((weights * model.stiffness)[None], len(q), axis=0)
-        stiff[..., 0] += self.weights * torsion
-        rows = jacobian.reshape(*jacobian.shape[:2], 3 * order, 4 * order)
-        scaled = rows * stiff.reshape(*rows.shape[:3])[..., None]
-        blocks = np.matmul(np.swapaxes(rows, -1, -2), scaled)
-        blocks = blocks.reshape(*blocks.shape[:2], order, 4, order, 4)
-        moment = 2.0 * weights * self.section_moments(strain[None], y)[0]
-        skew = np.einsum("leik,kab->leiab", moment, RIGHT)
-        mixed = np.einsum("eij,leiab->lejaib", self.slopes, skew)
-        blocks = blocks + mixed + mixed.transpose(0, 1, 4, 5, 2, 3)
-        pull, axial = (jet[0] for jet in self.section_forces(q[None], y))
-        stretch = weights * self.stretches(axial[None], y)[0]
-        force = np.einsum("ls,seic->leic", y[0], model.force)
-        curved = 2.0 * np.einsum("leik,leic,kcab->leiab", stretch, force, FRAME, optimize=True)
-        soft = weights * model.softness
-        curved = curved - np.einsum("eik,leika,leikb->leiab", soft, pull, pull, optimize=True)
-        blocks[:, :, i, :, i] += np.moveaxis(curved, 2, 0)
-        sided = np.einsum("meic,kcab,leib->lmeika", model.force[:m], FRAME, local, optimize=True)
-        ahead = np.einsum("lmeika,leia->lmeik", sided, local)
-        crossing = 2.0 * np.einsum("leik,lmeika->lmeia", stretch, sided)
-        crossing -= np.einsum("eik,lmeik,leika->lmeia", soft, ahead, pull, optimize=True)
-        closing = model.quadratic[:m, :m] - np.einsum(
-            "eik,lmeik,lneik->lmn", soft, ahead, ahead, optimize=True
-        )
-        return blocks, self.assemble(crossing), closing
+        For lanes with an unsafe pivot, and where a phase condition pins orbits.
+        """
+        rows, columns, groups = self.layout.rows, self.layout.columns, self._groups
+        count, lanes = int(groups.max()) + 1, len(z)
+        ways = np.tile((np.arange(count)[:, None] == groups).astype(float), (lanes, 1))
+        many = z.repeat(count, axis=0), p.repeat(count, axis=0)
+        found = self.equations(*many, (ways, np.zeros_like(many[1])))[1]
+        found = found.reshape(lanes, count, self.size)
+        later = (
+            groups[rows] > groups[columns]
+        )  # its column is alone in these rows; F_z is symmetric
+        column, row = np.where(later, rows, columns), np.where(later, columns, rows)
+        entries = found[:, groups[column], row]
+        if shift is not None:
+            entries[:, self.layout.diagonal[: self.unknowns]] -= shift[:, None] * self.mass
+        return entries
 
     # --- equations ------------------------------------------------------------------------------
 
@@ -206,12 +115,7 @@ class SpatialMechanics(SpatialLagrangian, JointEquations):
     # --- solves ---------------------------------------------------------------------------------
 
     def solve(
-        self,
-        z: Lanes,
-        p: Parameters,
-        rhs: Float[np.ndarray, "lanes sides bordered"],
-        border: Border | None = None,
-        shift: Values | None = None,
+        self, z: Lanes, p: Parameters, rhs: Sides, border: AnyBorder = None, shift: Shift = None
     ) -> BorderedSolution:
         """Solve with F_z − shift·mass, bordered.
 
@@ -238,7 +142,7 @@ class SpatialMechanics(SpatialLagrangian, JointEquations):
         return BorderedSolution(x, negative, ratio, unsafe, determinant)
 
     def solver(
-        self, parts: tuple[np.ndarray, ...], z: Lanes, p: Parameters, shift: Values | None = None
+        self, parts: tuple[np.ndarray, ...], z: Lanes, p: Parameters, shift: Shift = None
     ) -> Solver:
         """Solves with F_z − shift·mass."""
         del parts

@@ -22,7 +22,7 @@ from equimorph.linalg.simd import (
     store,
     where_less,
 )
-from equimorph.structures.spatial.element_kernels import BORDER, COLUMN, FORCE, ROW
+from equimorph.structures.spatial.force_kernels import BORDER, COLUMN, FORCE, ROW
 
 RADIUS, INVERSE, EXCESS, SOFT, RADIAL = range(5)
 """Rows of a node: r, 1/r, c (r² − 1), 1/(c (3 r² − 1)), and the closing row along q."""

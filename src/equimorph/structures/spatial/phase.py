@@ -17,10 +17,10 @@ from functools import cached_property, partial
 import numpy as np
 from jaxtyping import Float
 
-from equimorph.arrays import Entries, Flags, Lanes, Parameters, Values
+from equimorph.arrays import Flags, Lanes, Parameters, Sides, Values
 from equimorph.errors import InputError
-from equimorph.linalg import Border, BorderedSolution
-from equimorph.structures.equations import Advance, Direction, Equations
+from equimorph.linalg import BorderedSolution
+from equimorph.structures.equations import Advance, AnyBorder, Direction, Equations, Shift
 from equimorph.structures.spatial.mechanics import SpatialMechanics
 from equimorph.structures.spatial.model import ANGLES, SpatialModel
 from equimorph.structures.spatial.quaternions import (
@@ -174,21 +174,8 @@ class PinnedMechanics(SpatialMechanics):
             part[void, -1] = -values[void, -1]
         return out
 
-    def _entries(self, z: Lanes, p: Parameters, shift: Values) -> Entries:
-        out, void = super()._entries(z, p, shift), self.on_axis(z)
-        if void.any():
-            last = self.layout.rows == self.size - 1
-            out[np.ix_(void, last)] = 0.0
-            out[void, self.layout.diagonal[-1]] = -1.0
-        return out
-
     def solve(
-        self,
-        z: Lanes,
-        p: Parameters,
-        rhs: Float[np.ndarray, "lanes sides bordered"],
-        border: Border | None = None,
-        shift: Values | None = None,
+        self, z: Lanes, p: Parameters, rhs: Sides, border: AnyBorder = None, shift: Shift = None
     ) -> BorderedSolution:
         """Solve with F_z − shift·mass, bordered, by sparse elimination."""
         return self.layout.solve(self.entries(z, p, shift), border, rhs)
@@ -297,12 +284,7 @@ class OrbitMechanics(SpatialMechanics):
                          for each in fields(Advance)))  # fmt: skip
 
     def solve(
-        self,
-        z: Lanes,
-        p: Parameters,
-        rhs: Float[np.ndarray, "lanes sides bordered"],
-        border: Border | None = None,
-        shift: Values | None = None,
+        self, z: Lanes, p: Parameters, rhs: Sides, border: AnyBorder = None, shift: Shift = None
     ) -> BorderedSolution:
         """Solve with F_z − shift·mass, bordered."""
         there = self.on_orbits(z, p)

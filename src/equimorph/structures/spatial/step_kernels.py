@@ -23,11 +23,8 @@ from equimorph.structures.spatial.chain_kernels import (
     small_system,
     to_vertices,
 )
-from equimorph.structures.spatial.element_kernels import (
-    BORDER,
-    assemble_element,
-    reduce_rows,
-)
+from equimorph.structures.spatial.element_kernels import assemble_element, reduce_rows
+from equimorph.structures.spatial.force_kernels import BORDER
 from equimorph.structures.spatial.node_kernels import (
     COUNT,
     DEFECT,
