@@ -228,7 +228,7 @@ def test_wrong_coordinates_are_refused(spring_set):
         ([angle, angle], "`coordinates` must be different ones"),
         ([angle, twice], "`coordinates` must be independent; got angle, twice"),
         ([angle, "k"], "`coordinates` must be free parameters .* which is fixed"),
-        ([angle, "volume"], "`descriptor` must be angle, height or energy"),
+        ([angle, "volume"], "`descriptor` must be one of angle, height, energy"),
     ):
         with pytest.raises(InputError, match=message):
             em.DescriptorChart(spring_set, chosen)

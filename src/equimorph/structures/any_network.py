@@ -1,17 +1,16 @@
 """What trusses and frames have in common, in the user's units."""
 
-import re
 from abc import abstractmethod
 from collections.abc import Callable, Mapping
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
 
 from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Lanes, Parameters, Values
-from equimorph.errors import InputError, suggestion
+from equimorph.errors import InputError
 from equimorph.model import Descriptor, Parameter, position
 from equimorph.model.parameter import Role
 from equimorph.structures.contract import Symmetry
@@ -25,15 +24,12 @@ CONJUGATE = {
     **{"1/length": "force·length²", "length": "force", "rad": "force·length", "1": "force·length"},
 }
 """What does work on a parameter, by what this measures; "1" stands for several kinds."""
-_CALL = re.compile(r"(\w+)(?:\(([\w,-]+)\))?")
 Function = Callable[[Lanes, Parameters], Values]
 
 
 class AnyNetwork(DiscreteStructure):
     """A truss or a frame: edges between joints, with loads and actuators that its user names."""
 
-    written: ClassVar[Mapping[str, str]]
-    """Methods and properties that make descriptors, by the texts that mean these."""
     network: Network
     system: UnitSystem
     _actuators: dict[str, Any]
@@ -54,6 +50,7 @@ class AnyNetwork(DiscreteStructure):
     def _set_parameters(self, longer: Float[np.ndarray, "parameters edges"]) -> None:
         """Actuators, which may take no length to zero, and loads, all 0 by default."""
         self.length_unit, found = self.system.label("length"), []
+        self.energy_unit = self.system.label("force·length")
         names = (*self._actuators, *self._loads)
         for k, (name, change) in enumerate(zip(names, longer, strict=True)):
             unit = self.system.label(self.quantity(k))
@@ -157,15 +154,6 @@ class AnyNetwork(DiscreteStructure):
         return Descriptor(name, borne.unit, value, name, self.signature)
 
     @property
-    def total_energy(self) -> Descriptor:
-        """Energy of the network and its loads."""
-
-        def value(z: Lanes, p: Parameters) -> Values:
-            return np.asarray(self.energy_scale * self.energy(z, p))
-
-        return self._make("energy", "force·length", value, "E")
-
-    @property
     def elevation(self) -> Descriptor:
         """The travel of the first load; without loads, what moves first, or the energy."""
         return self.travel(next(iter(self._loads))) if self._loads else self.first_move()
@@ -173,23 +161,6 @@ class AnyNetwork(DiscreteStructure):
     def first_move(self) -> Descriptor:
         """Height in figures of the set of a network without loads."""
         return self.total_energy
-
-    @check_arguments
-    def descriptor(self, text: str) -> Descriptor:
-        """Return the descriptor written like ``displacement(B,y)`` or ``travel(F)``."""
-        found = _CALL.fullmatch(re.sub(r"\s", "", text))
-        name, inner = found.groups() if found else ("", None)
-        given = inner.split(",") if inner else []
-        for form, maker in self.written.items():
-            called, _, needed = form.partition("(")
-            if called == name and len(needed.split(",")) * bool(needed) == len(given):
-                made = getattr(self, maker)
-                return made if isinstance(made, Descriptor) else made(*given)
-        written = tuple(self.written)
-        raise InputError(
-            f"`descriptor` must be one of {', '.join(written)}; got {text!r}."
-            f"{suggestion(text, written)}"
-        )
 
 
 def _plain(given: Any) -> Any:

@@ -4,6 +4,7 @@ Those that Newton's method needs are in `structures.equations`.
 """
 
 import json
+import re
 from abc import abstractmethod
 from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass
@@ -13,8 +14,9 @@ from typing import Any, ClassVar
 import numpy as np
 from jaxtyping import Float, Int
 
+from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Flags, Lanes, Parameters, Values
-from equimorph.errors import InputError, MissingError
+from equimorph.errors import InputError, MissingError, suggestion
 from equimorph.html_tables import html_table
 from equimorph.model import (
     Constraint,
@@ -46,6 +48,8 @@ class Symmetry:
         return np.asarray(self.signs * (p if self.order is None else p[..., self.order]))
 
 
+_CALL = re.compile(r"(\w+)(?:\(([\w,-]+)\))?")
+"""Text of a descriptor: its name, and its arguments in parentheses if it has some."""
 Velocities = Float[np.ndarray, "lanes k unknowns"]
 Product = Callable[[Velocities], Velocities]
 
@@ -166,9 +170,9 @@ class Structure(Equations):
         """Whether natural states are defined at parameters; they need not exist everywhere."""
         return np.ones(len(p), bool)
 
-    @abstractmethod
     def unloaded(self) -> Mapping[str, float]:
-        """Parameter values at which natural states are defined (loads at zero)."""
+        """Parameter values at which natural states are defined: all loads zero."""
+        return {each.name: 0.0 for each in self.parameters if each.role == "load"}
 
     def natural_parameters(self, values: Mapping[str, float]) -> Float[np.ndarray, " parameters"]:
         """Parameters of a natural state: loads as in `unloaded`, the rest as given or by default.
@@ -250,17 +254,48 @@ class Structure(Equations):
         del z, p
         return Drawing()
 
-    @abstractmethod
-    def descriptor(self, text: str) -> Descriptor:
-        """Return the descriptor written as `text`, like ``height(0.5)``.
+    written: ClassVar[Mapping[str, str]] = {"energy": "total_energy"}
+    """Properties and methods that make descriptors, by the texts that mean these.
 
-        Every structure knows ``energy``, which reports show: `energy` times `energy_scale`.
+    Like ``{"energy": "total_energy", "displacement(joint,axis)": "displacement"}``: the arguments
+    in a text are given to the method as texts.
+    """
+    energy_unit: str = "energy"
+    """Unit of the descriptor ``energy``."""
+
+    @check_arguments
+    def descriptor(self, text: str) -> Descriptor:
+        """Return the descriptor written like one of the texts in `written`.
+
+        Every structure knows ``energy``, which reports show.
         """
+        found = _CALL.fullmatch(re.sub(r"\s", "", text))
+        name, inner = found.groups() if found else ("", None)
+        given = inner.split(",") if inner else []
+        for form, maker in self.written.items():
+            called, _, needed = form.partition("(")
+            if called == name and len(needed.split(",")) * bool(needed) == len(given):
+                made = getattr(self, maker)
+                return made if isinstance(made, Descriptor) else made(*given)
+        written = tuple(self.written)
+        raise InputError(
+            f"`descriptor` must be one of {', '.join(written)}; got {text!r}."
+            f"{suggestion(text, written)}"
+        )
+
+    @property
+    def total_energy(self) -> Descriptor:
+        """Potential energy with that of the loads: `energy` times `energy_scale`."""
+
+        def value(z: Lanes, p: Parameters) -> Values:
+            return np.asarray(self.energy_scale * self.energy(z, p))
+
+        return Descriptor("energy", self.energy_unit, value, "E", self.signature)
 
     @property
     def elevation(self) -> Descriptor:
         """Descriptor that is the height in figures of the set: the energy by default."""
-        return Descriptor("energy", "energy", self.energy, "E", self.signature)
+        return self.total_energy
 
     def symmetries(self) -> tuple[Symmetry, ...]:
         """Symmetries of the equilibrium set; none unless the structure says so."""

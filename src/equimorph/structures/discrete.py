@@ -1,7 +1,7 @@
 """Structures of finitely many unknowns whose KKT matrix is sparse, and their natural states."""
 
 from abc import abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import fields
 from functools import cached_property
 
@@ -71,14 +71,14 @@ NEAR = 0.1
 class DiscreteStructure(JointEquations, Structure):
     """Structure with a sparse KKT matrix and a natural state known at the default parameters.
 
-    Subclasses give `layout`, `linearised` (F, F_p·dp and the entries of F_z in the order of the
+    Subclasses give `linearised` (F, F_p·dp and the entries of F_z in the order of the
     layout) and `natural_guess`, and the rest of the contract.
     """
 
-    @property
-    @abstractmethod
+    @cached_property
     def layout(self) -> SparseLayout:
-        """Sparsity of F_z."""
+        """Sparsity of F_z; by default every unknown acts on every other one."""
+        return SparseLayout(*np.tril_indices(self.size), self.size, self.constraints)
 
     @abstractmethod
     def natural_guess(self, p: Parameters) -> Lanes:
@@ -151,10 +151,6 @@ class DiscreteStructure(JointEquations, Structure):
         """Natural state, continued from the default parameters."""
         start = np.where(np.isnan(self._reference), p, self._reference)
         return continue_equilibria(self, self.natural_guess, start, p)
-
-    def unloaded(self) -> Mapping[str, float]:
-        """All loads zero."""
-        return {each.name: 0.0 for each in self.parameters if each.role == "load"}
 
     @check_arguments
     def natural_state(self, **values: float) -> State:

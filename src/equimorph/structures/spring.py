@@ -1,6 +1,5 @@
 """The constrained spring: one degree of freedom, everything in closed form."""
 
-import re
 from collections.abc import Mapping
 from functools import cached_property
 from typing import Any, ClassVar
@@ -10,7 +9,6 @@ from jaxtyping import Float
 
 from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Flags, Lanes, Parameters, Sides, Values
-from equimorph.errors import InputError, suggestion
 from equimorph.linalg import BorderedSolution, no_border, solve_bordered
 from equimorph.model import (
     Descriptor,
@@ -200,10 +198,6 @@ class Spring(Structure):
         """Unloaded: the stress-free spring δ = arccos x_l for x_l < 1, else δ = 0."""
         return np.arccos(np.minimum(p[:, :1], 1.0)), np.ones(len(p), bool)
 
-    def unloaded(self) -> Mapping[str, float]:
-        """F = 0."""
-        return {"F": 0.0}
-
     @check_arguments
     def natural_state(self, **values: float) -> State:
         """Unloaded state with B above A."""
@@ -240,6 +234,13 @@ class Spring(Structure):
         signs = np.array([1.0, -1.0, 1.0])
         return (Symmetry("mirror", lambda z, p: (-z, p * signs), signs),)
 
+    written: ClassVar[Mapping[str, str]] = {
+        "angle": "angle",
+        "height": "height",
+        "energy": "total_energy",
+    }
+    energy_unit = "force·length"
+
     @cached_property
     def angle(self) -> Descriptor:
         """δ in radians."""
@@ -258,16 +259,3 @@ class Spring(Structure):
     def elevation(self) -> Descriptor:
         """δ."""
         return self.angle
-
-    @check_arguments
-    def descriptor(self, text: str) -> Descriptor:
-        """Return the descriptor written as ``angle``, ``height`` or ``energy``."""
-        name = re.sub(r"\s", "", text)
-        if name == "energy":
-            return Descriptor("energy", "force·length", self.energy, "E", self.signature)
-        if name not in {"angle", "height"}:
-            raise InputError(
-                f"`descriptor` must be angle, height or energy; got {text!r}."
-                f"{suggestion(name, ('angle', 'height', 'energy'))}"
-            )
-        return self.angle if name == "angle" else self.height

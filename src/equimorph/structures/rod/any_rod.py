@@ -86,7 +86,7 @@ class AnyRod(HeavyRod):
     """
 
     endless_in: ClassVar[str] = "max_curvature"
-    written: ClassVar[tuple[str, ...]]
+    forms: ClassVar[tuple[str, ...]]
     """Descriptors as texts, for error messages."""
     mechanics: RodMechanics
     units: Units
@@ -130,6 +130,7 @@ class AnyRod(HeavyRod):
         self.unknowns, self.constraints = mechanics.unknowns, mechanics.constraints
         self.mass, self.length_unit = mechanics.mass, self.units.label("length")
         self.energy_scale = self.units.value("couple")
+        self.energy_unit = self.units.energy_label
 
     def _complete_identity(
         self, data: dict[str, Any], resolution: tuple[int, int]
@@ -233,10 +234,6 @@ class AnyRod(HeavyRod):
 
     # --- natural states -------------------------------------------------------------------------
 
-    def unloaded(self) -> Mapping[str, float]:
-        """All loads zero."""
-        return {each.name: 0.0 for each in self.parameters if each.role == "load"}
-
     @check_arguments
     def natural_state(self, **values: float) -> State:
         """Natural state at given actuators: unloaded, continued from the stress-free rod.
@@ -301,16 +298,6 @@ class AnyRod(HeavyRod):
     def elevation(self) -> Descriptor:
         """y(½)."""
         return self.height(0.5)
-
-    @cached_property
-    def total_energy(self) -> Descriptor:
-        """Potential energy E, in units of 4π²B/L."""
-        unit = self.units.value("couple")
-
-        def value(z: Lanes, p: Parameters) -> Values:
-            return unit * self.mechanics.energy(z, p)
-
-        return Descriptor("energy", self.units.energy_label, value, "E", self.signature)
 
     def max_curvature_descriptor(self, branches: Branches | None = None) -> Descriptor:
         """Largest bending curvature; `branches` are its local maxima, where they are known."""
@@ -380,8 +367,8 @@ class AnyRod(HeavyRod):
         made = None if call is None else self._descriptor_of_name(call[1], call[2])
         if made is None:
             raise InputError(
-                f"`descriptor` must be one of {', '.join(self.written)}; got {text!r}."
-                f"{suggestion(text, self.written)}"
+                f"`descriptor` must be one of {', '.join(self.forms)}; got {text!r}."
+                f"{suggestion(text, self.forms)}"
             )
         return made
 

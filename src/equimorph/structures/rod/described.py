@@ -29,7 +29,7 @@ FORCES = {"x": 0, "y": 1, "lambda": 0, "mu": 1}
 class Described(Measured):
     """A planar rod with its descriptors, in the user's units."""
 
-    written: ClassVar[tuple[str, ...]] = (
+    forms: ClassVar[tuple[str, ...]] = (
         *("height(s)", "x(s)", "angle(s)", "curvature(s)", "max_curvature", "energy"),
         *("clearance(s)", "lateral_margin", "lateral_index"),
         *("support_force(x)", "support_force(y)", "end_moment(0)", "end_moment(1)"),

@@ -2,6 +2,7 @@
 
 from abc import abstractmethod
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
@@ -76,6 +77,10 @@ class RodMechanics(Equations):
         """Whether the highest Legendre coefficients of the rotations are small in every element."""
 
     @abstractmethod
+    def guess_for(self, finer: Any, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes finer"]:
+        """States as guesses of those of the same rod with other elements."""
+
+    @abstractmethod
     def symmetries(self) -> tuple[Symmetry, ...]:
         """Symmetries of the equilibrium set."""
 
@@ -142,6 +147,11 @@ class PlanarMechanics(RodMechanics):
     @abstractmethod
     def end_moments(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes 2"]:
         """Couples of the supports, or actuators, on both ends of the rod."""
+
+    def guess_for(self, finer: Any, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes finer"]:
+        """States as guesses of those of the same rod with other elements."""
+        matrix = self.mesh.interpolation(finer.mesh.nodes[finer.unknown_nodes])
+        return np.concatenate([self.nodal_angles(z, p) @ matrix.T, z[:, self.unknowns :]], axis=1)
 
     def resolved(self, z: Lanes, p: Parameters) -> Flags:
         """Whether the highest Legendre coefficients of θ are small in every element."""

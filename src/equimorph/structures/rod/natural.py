@@ -1,8 +1,9 @@
 """Natural states of rods: unloaded, continued from the straight or the stress-free rod."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -149,6 +150,17 @@ def correct_at_share(
     return Point(t, np.concatenate([more.z, more.p[:, [part.span]]], axis=1), slope), bend
 
 
+Pulls = Callable[[Parameters, Parameters], Flags]
+
+
+@runtime_checkable
+class AnyGeneral(Continued, Protocol):
+    """Mechanics of a rod in the plane or in space, whose Lagrangian is a model."""
+
+    model: Any
+    unknowns: int
+
+
 SMALLEST = 1e-3
 """End angles, √(Θ² + Δ²), below which the way leads over larger ones with the same ratio: the rod
 buckles at once, within round-off of the straight one, and small ones are regular afterwards."""
@@ -247,11 +259,22 @@ def natural_rod(rod: GeneralMechanics, p: Parameters) -> Natural:
     rod between pins that are nearer than its length has no natural state: it may buckle either
     way.
     """
-    names = rod.model.names
     start, z = _stress_free(rod, p)
+    return continue_ends(rod, z, start, p, lambda before, after: np.ones(len(before), bool))
+
+
+def continue_ends(
+    rod: AnyGeneral, z: Lanes, start: Parameters, p: Parameters, pulls: Pulls
+) -> Natural:
+    """States of stress-free rods, whose ends are then moved to where they belong.
+
+    With held spans first with λ = 0 and the span free, then the span. pulls: whether a change of
+    parameters may pull the rod straighter: it then bends within ever shorter ends, until the
+    elements no longer resolve it.
+    """
+    names, here = rod.model.names, np.arange(len(p))
     span = names.index("nu") if "nu" in names else None
-    out = Natural(z.copy(), np.zeros(len(p), int), np.ones(len(p)), np.ones(len(p)))
-    here = np.arange(len(p))
+    out = Natural(np.full_like(z, np.nan), np.zeros(len(p), int), *np.ones((2, len(p))))
     x = np.concatenate([z, start[:, [span or 0]]], axis=1)
     if span is not None and rod.model.quadratic[0, 0] == 0.0:
         still = np.zeros(len(p), bool)
@@ -262,14 +285,13 @@ def natural_rod(rod: GeneralMechanics, p: Parameters) -> Natural:
         out.outcome[~reached] = Outcome.FREE_FOLD
         here, x, start = here[reached], x[reached], p[reached]
         start[:, span] = x[:, -1]
-    sharpening = rod.resolved(x[:, :-1], start)
+    sharpening = pulls(start, p[here]) & rod.resolved(x[:, :-1], start)
     last = Part(start, p[here], free=False, sharpening=sharpening, span=span or 0)
     share, x = follow(rod, last, x)
     out.span[here] = x[:, -1]
     out.outcome[here[share < 1.0]] = Outcome.SPAN_FOLD
     there = np.flatnonzero(share >= 1.0)
     exact = correct_at_share(rod, last, there, np.ones(len(there)), x[there])[0].x[:, :-1]
-    out.z[:] = np.nan
     out.z[here[there]] = exact
     return out
 

@@ -19,7 +19,7 @@ from equimorph.structures.rod.description import PlanarDescription
 from equimorph.structures.rod.discretisation import ElementCount, mesh_with_kinks
 from equimorph.structures.rod.drawing import ENDS, Amplitudes, planar_supports, rod_drawing
 from equimorph.structures.rod.ends import End, EndSpec
-from equimorph.structures.rod.errors import discretisation_error
+from equimorph.structures.rod.errors import SAMPLES, discretisation_error
 from equimorph.structures.rod.general import GeneralMechanics
 from equimorph.structures.rod.mechanics import PlanarMechanics
 from equimorph.structures.rod.model import RodModel
@@ -332,7 +332,15 @@ class Rod(Described):
         part is the smallest by far. Infinite where the finer rod has no equilibrium near the
         state, as may happen at a fold.
         """
-        return discretisation_error(self.mechanics, self.refined, z, p)
+        return discretisation_error(self.mechanics, self.refined, self.compared, z, p)
+
+    @staticmethod
+    def compared(
+        rod: PlanarMechanics, z: Lanes, p: Parameters
+    ) -> Float[np.ndarray, "lanes compared"]:
+        """Largest |κ|, κ(s) and y(s), whose changes bound the error."""
+        fields = rod.fields(z, p, SAMPLES)[:, :, [1, 3]].reshape(len(z), -1)
+        return np.column_stack([rod.largest_curvature(z, p)[0], fields])
 
     # --- out of the plane -------------------------------------------------------------------
 

@@ -28,7 +28,7 @@ FORCES = {"lambda": 0, "mu": 1, "x": 0, "y": 1, "z": 2}
 class DescribedInSpace(MeasuredInSpace):
     """A rod in space with its descriptors, in the user's units."""
 
-    written: ClassVar[tuple[str, ...]] = (
+    forms: ClassVar[tuple[str, ...]] = (
         *("height(s)", "x(s)", "z(s)", "turn(s)", "tilt(s)", "roll(s)"),
         *("curvature(s)", "side_curvature(s)", "twist(s)", "bending(s)", "max_curvature"),
         *("energy", "clearance(s)", "support_force(x)", "end_couple(0, x)"),

@@ -5,6 +5,8 @@ rotation of a node is q/|q|, so that z + dz is a state for every dz; the energy 
 keeps lengths at 1, and is zero at equilibria. See docs/decisions.md, "Rotations in space".
 """
 
+from typing import Any
+
 import numpy as np
 from jaxtyping import Float
 
@@ -246,6 +248,13 @@ class SpatialLagrangian(RodMechanics):
         s = self.mesh.nodes[:, None]
         angles = ends[:, :1] * (1.0 - s) + ends[:, 1:] * s
         return np.asarray(clamp_rotation(angles[None])[0])
+
+    def guess_for(self, finer: Any, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes finer"]:
+        """States as guesses of those of the same rod with other elements."""
+        matrix = self.mesh.interpolation(finer.mesh.nodes[finer.model.unknown_nodes])
+        nodal = np.einsum("mn,lna->lma", matrix, self.rotations(z, p))
+        nodal /= np.linalg.norm(nodal, axis=-1, keepdims=True)
+        return np.concatenate([nodal.reshape(len(z), -1), z[:, self.unknowns :]], axis=1)
 
     def tail(self, z: Lanes, p: Parameters) -> Values:
         """Largest of the two highest Legendre coefficients of q in all elements."""

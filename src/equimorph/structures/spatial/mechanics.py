@@ -72,11 +72,10 @@ class SpatialMechanics(SpatialLagrangian, JointEquations):
         many = z.repeat(count, axis=0), p.repeat(count, axis=0)
         found = self.equations(*many, (ways, np.zeros_like(many[1])))[1]
         found = found.reshape(lanes, count, self.size)
-        later = (
-            groups[rows] > groups[columns]
-        )  # its column is alone in these rows; F_z is symmetric
+        # F_z is symmetric, and the column of the later group is alone in the row of the other
+        later = groups[rows] > groups[columns]
         column, row = np.where(later, rows, columns), np.where(later, columns, rows)
-        entries = found[:, groups[column], row]
+        entries = np.asarray(found[:, groups[column], row])
         if shift is not None:
             entries[:, self.layout.diagonal[: self.unknowns]] -= shift[:, None] * self.mass
         return entries

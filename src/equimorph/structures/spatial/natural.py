@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from equimorph.arrays import Flags, Lanes, Parameters, Values
-from equimorph.structures.rod.natural import Part, correct_at_share, follow
+from equimorph.structures.rod.natural import Outcome, continue_ends
 from equimorph.structures.spatial.ends import PLACES
 from equimorph.structures.spatial.mechanics import SpatialMechanics
 from equimorph.structures.spatial.model import ANGLES
@@ -41,36 +41,18 @@ def natural_states(rod: SpatialMechanics, p: Parameters) -> tuple[Lanes, Flags]:
     between the supports, or as its only clamp says. Between two clamps it is turned with the span
     free; then the ends move to where they belong.
     """
-    names = rod.model.names
     start = np.where(_forces(rod), 0.0, p)
     shape = _stress_free(rod, start)
     shape = shape.turned(_orientation(rod, p, shape))
-    start = _ends_of(rod, start, shape)
     z = np.zeros((len(p), rod.size))
     inner = rod.model.unknown_nodes
     z[:, : rod.unknowns] = shape.rotations[:, inner].reshape(len(p), rod.unknowns)
-    span = names.index("nu") if "nu" in names else None
-    here = np.arange(len(p))
-    x = np.concatenate([z, start[:, [span or 0]]], axis=1)
-    still = np.zeros(len(p), bool)
-    if span is not None and rod.model.quadratic[0, 0] == 0.0:
-        turn = Part(start, p, free=True, sharpening=still, span=span, multiplier=rod.unknowns)
-        share, x = follow(rod, turn, x)
-        here = np.flatnonzero(share >= 1.0)
-        x, start = x[here], p[here]
-        start[:, span] = x[:, -1]
-    # a rod that is pulled straighter bends within ever shorter ends
-    sharpening = _apart(rod, p[here]) > _apart(rod, start)
-    sharpening &= rod.resolved(x[:, :-1], start)
-    last = Part(start, p[here], free=False, sharpening=sharpening, span=span or 0)
-    share, x = follow(rod, last, x)
-    there = np.flatnonzero(share >= 1.0)
-    out, found = np.full_like(z, np.nan), np.zeros(len(p), bool)
-    out[here[there]] = correct_at_share(rod, last, there, np.ones(len(there)), x[there])[0].x[
-        :, :-1
-    ]
-    found[here[there]] = True
-    return out, found
+
+    def pulls(before: Parameters, after: Parameters) -> Flags:
+        return _apart(rod, after) > _apart(rod, before)
+
+    found = continue_ends(rod, z, _ends_of(rod, start, shape), p, pulls)
+    return found.z, found.outcome == Outcome.FOUND
 
 
 def _apart(rod: SpatialMechanics, p: Parameters) -> Values:

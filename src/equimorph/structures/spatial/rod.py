@@ -5,6 +5,7 @@ from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
+from jaxtyping import Float
 
 from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Flags, Lanes, Parameters, Values
@@ -13,6 +14,7 @@ from equimorph.model import Drawing, parameter_vector
 from equimorph.structures.discrete import correct_at_parameters
 from equimorph.structures.rod.discretisation import ElementCount
 from equimorph.structures.rod.drawing import ENDS, rod_drawing
+from equimorph.structures.rod.errors import SAMPLES, discretisation_error
 from equimorph.structures.rod.profiles import LoadSpec, MeasuredProfile, ProfileSpec, load_shape
 from equimorph.structures.rod.sections import CrossSection
 from equimorph.structures.rod.space_options import SpaceOptions
@@ -21,7 +23,7 @@ from equimorph.structures.spatial.described import DescribedInSpace
 from equimorph.structures.spatial.description import SpatialDescription
 from equimorph.structures.spatial.drawing import spatial_supports
 from equimorph.structures.spatial.ends import Ends
-from equimorph.structures.spatial.errors import discretisation_error
+from equimorph.structures.spatial.fields import SpatialFields
 from equimorph.structures.spatial.mechanics import SpatialMechanics
 from equimorph.structures.spatial.natural import natural_states
 from equimorph.structures.spatial.orbits import pinned_guess, pinned_natural_states
@@ -303,7 +305,17 @@ class SpatialRod(DescribedInSpace):
         Twice the largest change of max |κ|, and of strains and places at 25 arclengths. Infinite
         where the finer rod has no equilibrium near the state, as may happen at a fold.
         """
-        return discretisation_error(self.mechanics, self._refined, z, p)
+        return discretisation_error(self.mechanics, self._refined, self.compared, z, p)
+
+    @staticmethod
+    def compared(
+        rod: SpatialMechanics, z: Lanes, p: Parameters
+    ) -> Float[np.ndarray, "lanes compared"]:
+        """Largest bending curvature, strains and places, whose changes bound the error."""
+        recovery = SpatialFields(rod)
+        here = recovery.at(z, p, SAMPLES)
+        fields = np.concatenate([here.strains, here.places], axis=2).reshape(len(z), -1)
+        return np.column_stack([recovery.largest_curvature(z, p)[0], fields])
 
     @cached_property
     def _refined(self) -> SpatialMechanics:
