@@ -65,7 +65,7 @@ def test_shape_runs_from_the_actuator_to_the_line():
         (lambda: Spring(np.nan), "`stiffness` must be a finite number"),
         (lambda: Spring().natural_state(F=0.1), "`F` must be 0 in the natural state"),
         (lambda: Spring().natural_state(x_l=-1.0), "`x_l` must be a finite number greater"),
-        (lambda: Spring().descriptor("length"), "`descriptor` must be one of angle, height, energy"),
+        (lambda: Spring().descriptor("length"), "`descriptor` must be one of angle, height"),
     ],
 )
 def test_bad_input_is_refused(call, text):

@@ -1,6 +1,7 @@
 """Discretisation errors of rods, by solving again with a higher degree."""
 
 from collections.abc import Callable
+from typing import TypeVar
 
 import numpy as np
 from jaxtyping import Float
@@ -12,11 +13,16 @@ from equimorph.structures.rod.mechanics import RodMechanics
 SAMPLES = np.linspace(0.0, 1.0, 25)
 """Arclengths at which fields are compared."""
 
-Compared = Callable[[RodMechanics, Lanes, Parameters], Float[np.ndarray, "lanes compared"]]
+Rod = TypeVar("Rod", bound=RodMechanics)
+Compared = Float[np.ndarray, "lanes compared"]
 
 
 def discretisation_error(
-    rod: RodMechanics, finer: RodMechanics, compared: Compared, z: Lanes, p: Parameters
+    rod: Rod,
+    finer: Rod,
+    compared: Callable[[Rod, Lanes, Parameters], Compared],
+    z: Lanes,
+    p: Parameters,
 ) -> Values:
     """Twice the largest change of what is compared after Newton on a finer rod."""
     still, one, none = np.zeros((len(z), finer.size)), np.ones(len(z)), np.zeros(len(z))

@@ -1,11 +1,17 @@
-"""Natural states of rods in space: unloaded, continued from the stress-free shape."""
+"""States of rods in space to begin from: natural ones, continued from the stress-free shape.
+
+And guesses from states of planar rods.
+"""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Float
 
 from equimorph.arrays import Flags, Lanes, Parameters, Values
+from equimorph.errors import InputError
+from equimorph.structures.rod.measured import Measured
 from equimorph.structures.rod.natural import Outcome, continue_ends
 from equimorph.structures.spatial.ends import PLACES
 from equimorph.structures.spatial.mechanics import SpatialMechanics
@@ -14,9 +20,11 @@ from equimorph.structures.spatial.quaternions import (
     RIGHT,
     clamp_rotation,
     conjugate,
+    half_turn,
     matrices,
     product,
 )
+from equimorph.structures.states import State
 
 Rotations = Float[np.ndarray, "lanes 4"]
 
@@ -145,3 +153,24 @@ def clamp_angles(q: Rotations) -> tuple[Values, Values, Values]:
     twist = np.arctan2(r[:, 2, 1], r[:, 2, 2])
     again = clamp_rotation(np.stack([turn, tilt, twist], axis=-1)[None])[0]
     return turn, tilt, twist + 2.0 * np.pi * ((again * q).sum(axis=1) < 0.0)
+
+
+def planar_guess(mechanics: SpatialMechanics, state: Any) -> Lanes:
+    """Unknowns with the angles and the support forces of a planar rod's state.
+
+    Raises
+    ------
+    InputError
+        For anything but the state of a planar rod.
+    """
+    if not (isinstance(state, State) and isinstance(state.structure, Measured)):
+        raise InputError(f"`state` must be a state of a planar rod; got {state!r}.")
+    rod = state.structure
+    z, p = state.z[None], state.p[None]
+    nodes = mechanics.mesh.nodes[mechanics.model.unknown_nodes]
+    angles = rod.fields(z, p, nodes)[:, :, 0]
+    q = half_turn(angles[None], 2)[0]
+    along = np.append(rod.mechanics.support_forces(z, p)[0], 0.0)
+    m = mechanics.constraints
+    held = mechanics.model.reaction[:, :m]  # which coordinate each multiplier belongs to
+    return np.concatenate([q.reshape(1, mechanics.unknowns), (along @ held)[None]], axis=1)
