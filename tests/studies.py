@@ -125,11 +125,11 @@ def rows_of(file: Path) -> list[list[str]]:
         return list(csv.reader(table))
 
 
-def refuse(text: str, old: str, new: str, message: str) -> None:
+def refuse(text: str, old: str, new: str, message: str, name: str = "study.toml") -> None:
     """A study with something replaced is refused in one line."""
     assert old in text
     with pytest.raises(InputError, match=message) as found:
-        prepare(parse_study(text.replace(old, new, 1), "study.toml"))
+        prepare(parse_study(text.replace(old, new, 1), name))
     assert "\n" not in str(found.value)
 
 

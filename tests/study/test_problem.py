@@ -132,7 +132,7 @@ WRONG = {
 
 @pytest.mark.parametrize("case", WRONG)
 def test_a_wrong_study_gets_one_line_with_its_key(case: str, arch_text: str):
-    refuse(arch_text, *WRONG[case])
+    refuse(arch_text, *WRONG[case], name="arch.toml")
 
 
 def test_the_line_begins_with_the_file(arch_text: str):
