@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import equimorph as em
+import sets
 from equimorph.errors import InputError
 from equimorph.plotting import chart_domain, parameterisation
 from equimorph.plotting.charts import rows_of
@@ -14,7 +15,7 @@ from typecheck import unchecked
 
 @pytest.fixture(scope="module")
 def spring_set():
-    return lifted(em.Spring(), em.Box(x_l=(0.3, 1.3), F=(-0.5, 0.5)), (12, 12))
+    return sets.spring_set()
 
 
 def test_barriers_are_thick_and_gaps_hatched(spring_set):

@@ -51,7 +51,7 @@ def test_other_sets_are_refused():
         plane = equilibrium_set(
             Spring(), Box(x_l=(1.1, 1.4), F=(-0.1, 0.1)), intervals=(3, 4), checks=0
         )
-    with pytest.raises(InputError, match="two parameters; got 1"):
+    with pytest.raises(InputError, match="two free parameters; got F"):
         plotting.snap_panels(snap_graph(line))
     with pytest.raises(InputError, match="stability boundary"):
         plotting.snap_panels(snap_graph(plane))

@@ -35,7 +35,8 @@ def made(kind, eset):
 def test_charts_come_back_and_answer_alike(kind, spring_set, tmp_path):
     """Identity: states bit for bit, statuses alike."""
     chart = made(kind, spring_set)
-    back = load_chart(save_chart(tmp_path / "chart.h5", chart))
+    with unchecked():
+        back = load_chart(save_chart(tmp_path / "chart.h5", chart))
     assert repr(back) == repr(chart)
     with unchecked():
         one, other = chart.state(AT), back.state(AT)

@@ -388,13 +388,13 @@ def test_branch_points_are_referred_to_the_law():
         (lambda s: sensitivity(s, [], ["y"]), "`y` must be a parameter"),
         (lambda s: imperfection_law(s, "F", "F"), "`imperfection` must not be the load; got 'F'."),
         (lambda s: imperfection_law(s, "F", "x_l", sizes=[1e-3]), "`sizes` must be three or more"),
-        (lambda s: stable_room(s, {}), "`tolerances` must be positive numbers; got {}."),
+        (lambda s: stable_room(s, {}), "`tolerances` must name at least one parameter; got none."),
         (lambda s: stable_room(s, {"F": -1.0}), "`tolerances` must be positive numbers by name"),
         (lambda s: stable_room(s, {"F": 1.0}, shape="ball"), "`shape` must be box or ellipsoid;"),
         (lambda s: stable_room(s, {"F": 1.0}, most=0.0), "`most` must be positive and finite"),
         (
             lambda s: random_trials(s, [{"F": 0.1}], {}),
-            "`spreads` must be positive numbers; got {}.",
+            "`spreads` must name at least one parameter; got none.",
         ),
         (
             lambda s: random_trials(s, [{"F": 0.1}], {"F": 0.1}, trials=0),

@@ -18,13 +18,13 @@ SECTIONS = {"round": (0.77, 1.0), "A = 2, C = 0.9": (0.9, 2.0)}
 COLOURS = ("#d1004b", "#e8902a", "#90b4d6", "#417aac", "#1d3f66")
 
 
-def main(folder: Path) -> dict[str, float]:
+def main(folder: Path, widths: int = 60) -> dict[str, float]:
     """Judge every state of the way for all sections."""
     up = em.lift(ARCH.natural_state(Theta=1.0), {"q": LOAD}).end.state
     path = em.lift(up, WAY, options=em.TraceOptions(largest_step=0.05))
     strips = {f"{ratio:.3g} : 1": strip(ratio) for ratio in RATIOS}
     found = {name: margins(path, *stiff) for name, stiff in (SECTIONS | strips).items()}
-    ratios = np.geomspace(1.0, 40.0, 60)
+    ratios = np.geomspace(1.0, 40.0, widths)
     least = [margins(path, *strip(ratio)).min() for ratio in ratios]
     panels = Figure(figsize=(7.2, 2.6))
     with em.plotting.house_style():

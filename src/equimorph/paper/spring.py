@@ -15,7 +15,7 @@ SMOOTH = 1e-3
 """Distance of the surface from its triangles up to which lines on it look smooth at its cusp."""
 
 
-def main(folder: Path) -> dict[str, float]:
+def main(folder: Path, accuracy: float = SMOOTH) -> dict[str, float]:
     """Answer the tasks of the article from C_s, at the load of C_s."""
     spring = em.Spring()
     angle, load, length = spring.angle, em.value_of(spring, "F"), em.value_of(spring, "x_l")
@@ -23,7 +23,7 @@ def main(folder: Path) -> dict[str, float]:
     slice_ = em.equilibrium_set(spring, em.Box(F=(-0.1, 0.1)), fixed={"x_l": 0.8}, within=within)
     eset = em.equilibrium_set(
         spring, em.Box(x_l=(0.5, 1.2), F=(-0.25, 0.25)), within=within, intervals=(35, 35),
-        accuracy=SMOOTH,
+        accuracy=accuracy,
     )  # fmt: skip
     known = {angle: START["delta"], length: START["x_l"]}
     start = em.solve_shape(eset, known).stable[0]

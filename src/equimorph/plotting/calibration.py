@@ -55,7 +55,7 @@ def calibration(found: Calibration, measured: MeasuredShape, ax: Axes | None = N
     there = np.isfinite(points)
     if there.sum() != len(found.residuals):
         raise InputError(
-            f"`measured` must be what was fitted, {len(found.residuals)} numbers; "
+            f"`measured` must be the shape that was fitted, with {len(found.residuals)} numbers; "
             f"got {there.sum()}."
         )
     left = np.full(points.shape, np.nan)

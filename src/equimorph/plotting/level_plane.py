@@ -17,9 +17,9 @@ from equimorph.model import Descriptor
 from equimorph.plotting import style
 from equimorph.plotting.curves import fold_pieces, path_of, states_along
 from equimorph.plotting.labels import descriptor_label, roomiest
-from equimorph.plotting.plane import check_two_parameters
 from equimorph.structures import State, States
 from equimorph.tasks.route import Route
+from equimorph.tasks.start import check_two_parameters
 
 _TINT = 0.22
 """Strength of the colours of indices: lines and words on top stay readable."""

@@ -41,6 +41,7 @@ from equimorph.plotting.labels import (
 )
 from equimorph.structures import States
 from equimorph.tasks.route import Route
+from equimorph.tasks.start import check_two_parameters
 
 _STABILITY_BOUNDARY: dict[str, Any] = {"color": style.INK, "linewidth": 1.4, "zorder": 4}
 _OTHER_FOLD: dict[str, Any] = {"color": style.INK, "linewidth": 0.6, "zorder": 3}
@@ -139,12 +140,6 @@ def parameter_plane(
         entries = [*lines, *hatched[:1]]
         style.legend_below(ax, entries, room=own)
     return ax
-
-
-def check_two_parameters(eset: EquilibriumSet) -> None:
-    """Refuse sets over one or three parameters."""
-    if len(eset.names) != 2:
-        raise InputError(f"`eset` must have two free parameters; got {', '.join(eset.names)}.")
 
 
 def frame_plane(ax: Axes, eset: EquilibriumSet) -> None:

@@ -20,6 +20,7 @@ from equimorph.plotting import style
 from equimorph.plotting.counts import hatch_cut, shade_regions
 from equimorph.plotting.labels import descriptor_label, number_points
 from equimorph.plotting.plane import draw_folds, frame_plane
+from equimorph.tasks.start import check_two_parameters
 
 _HEIGHT = 2.75
 """Inches of the figure."""
@@ -57,8 +58,7 @@ def snap_panels(graph: SnapGraph, descriptor: Descriptor | None = None) -> Figur
         If the set is not one over two parameters, or has no stability boundary.
     """
     eset = graph.eset
-    if len(eset.names) != 2:
-        raise InputError(f"`graph` must be of a set over two parameters; got {len(eset.names)}.")
+    check_two_parameters(eset, "graph")
     if not graph.snaps:
         raise InputError("`graph` must have a stability boundary; got a set without one.")
     figure = style.attach_canvas(Figure(figsize=(style.DOUBLE_COLUMN, _HEIGHT)))

@@ -7,7 +7,7 @@ from pydantic import AfterValidator, Field, WithJsonSchema
 
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
-from equimorph.model import Grid, Rates, Schedule, names_of, position
+from equimorph.model import Grid, Rates, Schedule, position
 from equimorph.structures import State, Structure
 from equimorph.study.arguments import Argument, StateArgument
 from equimorph.study.data_files import ScheduleName
@@ -23,6 +23,7 @@ from equimorph.study.lookup import (
 )
 from equimorph.study.states import StateSection
 from equimorph.tasks.maps.actuator_map import unloaded_base
+from equimorph.tasks.start import check_schedule
 from equimorph.tasks.verification.schedule_check import first_state
 
 Intervals = Annotated[list[Count], Field(min_length=2, max_length=2)]
@@ -79,17 +80,12 @@ class WayArgument(Argument):
 
     def look_up(self, ground: Ground, section: Any, place: str) -> Any:
         """Check names and values."""
-        names = names_of(ground.structure.parameters)
         if section.schedule is None:
             for i, step in enumerate(section.steps):
                 check_values(ground.structure, step, f"{place}.steps[{i}]")
             return section.steps
         schedule = section.schedule.schedule
-        if schedule.names != names:
-            raise InputError(
-                f"`{place}.schedule` must give the parameters {', '.join(names)}; "
-                f"got {', '.join(schedule.names)}."
-            )
+        check_schedule(schedule, ground.structure, f"{place}.schedule")
         return schedule
 
 
@@ -104,7 +100,9 @@ class ObjectiveArgument(Argument):
     def check(self, section: Any) -> None:
         """Time has rates, and nothing else has."""
         if ("time" in _terms(getattr(section, self.key))) != (section.rates is not None):
-            raise requirement("give the largest rates where its objective counts time, only there")
+            raise requirement(
+                "give the largest rates where its objective counts time, and only there"
+            )
 
     def look_up(self, ground: Ground, section: Any, place: str) -> Any:
         """Weights with terms."""

@@ -183,7 +183,7 @@ def _shape(
     for state, rows in enumerate(states):
         at = np.searchsorted(places, column["s"][rows])
         if len(set(at.tolist())) < len(at):
-            raise InputError(f"`{key}.data` must have each s once in a state.")
+            raise InputError(f"`{key}.data` must give each s once in a state.")
         points[state, at] = np.stack([column["x"][rows], column["y"][rows]], axis=1)
         if SIGMA in column:
             deviations[state, at] = column[SIGMA][rows][:, None]

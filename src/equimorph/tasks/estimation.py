@@ -163,8 +163,6 @@ def estimate_state(
     ('known', 0.009908)
     """
     fit = _fit(eset, measured, errors)
-    if not 0.5 < confidence < 1.0:
-        raise InputError(f"`confidence` must lie between 0.5 and 1; got {confidence!r}.")
     if not unstable and not (eset.cell_index == 0).any():
         raise InputError("`eset` must have stable cells; got none.")
     found, misfit, inside = _minima(eset, fit.residuals, unstable)
@@ -192,8 +190,8 @@ def estimate_state(
 
 
 def _fit(eset: EquilibriumSet, measured: Measured, errors: Measured) -> ValueFit:
-    if len(eset.cells) == 0:
-        raise InputError("`eset` must have states to compare with; got an empty set.")
+    if not len(eset.cells):
+        raise InputError("`eset` must have cells; got an empty set.")
     for what in measured:
         if what not in errors:
             name = what if isinstance(what, str) else what.name
@@ -288,10 +286,6 @@ def _resolving(
     options = _coordinates(states) if could_measure is None else dict(could_measure)
     best: Resolving | None = None
     for descriptor, error in options.items():
-        if not float(error) > 0.0:
-            raise InputError(
-                f"`could_measure` must give positive errors; got {descriptor.name}: {error!r}."
-            )
         values = descriptor(states)
         apart = float(np.abs(values[rivals[1:]] - values[0]).min() / error)
         if best is None or apart > best.separation:

@@ -7,8 +7,8 @@ import numpy as np
 from equimorph.equilibria import check_start
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet, Location
-from equimorph.model import Constraint
-from equimorph.structures import State
+from equimorph.model import Constraint, Schedule, names_of
+from equimorph.structures import State, Structure
 from equimorph.tasks.estimation import StateEstimate
 
 Start = State | Location | StateEstimate
@@ -41,6 +41,28 @@ def check_stable(name: str, state: State) -> None:
     """Raise `InputError` unless the argument `name` is a stable state."""
     if not state.stable:
         raise InputError(f"`{name}` must be stable; got a state of index {state.index}.")
+
+
+def check_cells(eset: EquilibriumSet) -> None:
+    """Raise `InputError` if a set is empty."""
+    if not len(eset.cells):
+        raise InputError("`eset` must have cells; got an empty set.")
+
+
+def check_two_parameters(eset: EquilibriumSet, name: str = "eset") -> None:
+    """Raise `InputError` unless the set of the argument `name` is over two parameters."""
+    if len(eset.names) != 2:
+        raise InputError(f"`{name}` must have two free parameters; got {', '.join(eset.names)}.")
+
+
+def check_schedule(schedule: Schedule, structure: Structure, name: str = "schedule") -> None:
+    """Raise `InputError` unless the schedule `name` gives the parameters of a structure."""
+    names = names_of(structure.parameters)
+    if schedule.names != names:
+        raise InputError(
+            f"`{name}` must give the parameters {', '.join(names)}; "
+            f"got {', '.join(schedule.names)}."
+        )
 
 
 def check_fixed_parameters(name: str, state: State, eset: EquilibriumSet) -> None:

@@ -135,7 +135,9 @@ def test_the_least_of_several_functions_is_raised_to_its_kink():
 
 
 def test_bad_questions_are_refused(uniform):
-    with pytest.raises(InputError, match="`offsets` must be positive, of Theta or Delta; got q"):
+    with pytest.raises(
+        InputError, match="`offsets` must be positive numbers for Theta or Delta; got q"
+    ):
         em.strongest(uniform, offsets={"q": 0.1})
     with pytest.raises(InputError, match=r"got Theta = -0\.1"):
         em.strongest(uniform, offsets={"Theta": -0.1})

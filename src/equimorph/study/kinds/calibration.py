@@ -201,7 +201,7 @@ def _natural_states(structure: Structure, measured: Measured) -> States:
     z, found = structure.natural(p)
     if not found.all():
         raise InputError(
-            f"`at` must have a natural state; got state {np.flatnonzero(~found)[0] + 1} without."
+            f"`at` must have a natural state; got none for state {np.flatnonzero(~found)[0] + 1}."
         )
     start = States(structure, z, p)
     to = {name: np.array([values[name] for values in measured.parameters]) for name in unloaded}

@@ -53,7 +53,9 @@ class ChartKind(Kind[Chart | Atlas]):
     def check(self, section: Any) -> None:
         """Coordinates belong to charts over descriptors."""
         if (section.kind == "descriptors") != (section.coordinates is not None):
-            raise requirement('give coordinates to a chart of the kind "descriptors", only there')
+            raise requirement(
+                'give coordinates to a chart of the kind "descriptors", and only there'
+            )
 
     def answer(self, question: Question, arguments: Arguments) -> Chart | Atlas:
         """Parameterise the stable part of the set, or all of it."""

@@ -153,7 +153,7 @@ class SampledRouteKind(Kind[Route]):
     def check(self, section: Any) -> None:
         """It ends at a goal, or under loads."""
         if section.goal is None and not section.loads:
-            raise requirement("give a goal, or loads, of which the last one holds at the goal")
+            raise requirement("give a goal, or loads whose last values hold at the goal")
 
     def look_up_more(self, question: Question) -> None:
         """Refuse actuators among the loads."""

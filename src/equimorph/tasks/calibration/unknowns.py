@@ -169,4 +169,4 @@ def _check(kind: str, group: tuple[str, ...], nominal: Parameters, used: set[str
             "Fit its offset, or make them equal."
         )
     if kind == "gain" and not nominal.any():
-        raise InputError(f"`start` must have {words} other than zero for a gain; got zeros.")
+        raise InputError(f"`start` must have nonzero values of {words} for a gain; got zeros.")

@@ -103,7 +103,9 @@ class ActuatorMap(ABC):
         point = _point(self.grid, setting)[None]
         z, found = self.sheet.states(point)
         if not found[0]:
-            raise InputError(f"`setting` must have a natural state; got {dict(setting)}.")
+            raise InputError(
+                f"`setting` must have a natural state; got {dict(setting)}, which has none."
+            )
         return State(self.structure, z[0], self.sheet.parameters(point)[0])
 
 

@@ -39,8 +39,10 @@ from equimorph.tasks.stable_part import (
     vertex_values,
 )
 from equimorph.tasks.start import (
+    check_cells,
     check_equilibrium,
     check_fixed_parameters,
+    check_stable,
     inadmissible,
 )
 from equimorph.tolerances import FEASIBLE, SAME_SOLUTION
@@ -123,7 +125,7 @@ class Optima:
             If there is no optimum; check `status` first.
         """
         if not self.found:
-            raise InputError(f"`best` is that of optima that were found; got none: {self.why}.")
+            raise InputError(f"`best` needs an optimum; got none: {self.why}.")
         return self.all[0]
 
     @property
@@ -229,13 +231,11 @@ def _refusal(why: str, sense: Sense, eset: EquilibriumSet) -> Optima:
 
 
 def _check(eset: EquilibriumSet, sense: str, margin: float, start: State | None) -> None:
-    if not len(eset.cells):
-        raise InputError("`eset` must have cells; got an empty set.")
+    check_cells(eset)
     if start is None:
         return
     check_equilibrium("start", start, eset.constraints)
-    if not start.stable:
-        raise InputError(f"`start` must be stable; got index {start.index}.")
+    check_stable("start", start)
     check_fixed_parameters("start", start, eset)
 
 

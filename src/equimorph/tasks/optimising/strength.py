@@ -174,7 +174,7 @@ def strongest(
     for name, size in given.items():
         if name not in lmap.grid.names or not (np.isfinite(size) and size > 0.0):
             raise InputError(
-                f"`offsets` must be positive, of {' or '.join(lmap.grid.names)}; "
+                f"`offsets` must be positive numbers for {' or '.join(lmap.grid.names)}; "
                 f"got {name}: {size!r}."
             )
     if not np.isfinite(lmap.value).any():

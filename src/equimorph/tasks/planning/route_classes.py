@@ -9,7 +9,6 @@ from jaxtyping import Float, Int
 
 from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Edges
-from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Constraint, Descriptor
 from equimorph.structures import State, States
@@ -33,6 +32,7 @@ from equimorph.tasks.planning.straightening import (
     violation,
 )
 from equimorph.tasks.route import Route, refusal
+from equimorph.tasks.start import check_two_parameters
 
 MOST_TURNS = 2
 """How often a path may pass around one hole."""
@@ -86,8 +86,7 @@ def alternatives(
     InputError
         As `plan`, or for sets over one or three parameters, or a count below one.
     """
-    if len(eset.names) != 2:
-        raise InputError(f"`eset` must be over two parameters; got {len(eset.names)}.")
+    check_two_parameters(eset)
     demands = Demands.of(eset.structure, objective, (*eset.constraints, *within), margin)
     ends = (start, goal)
     check_ends(eset, ends)

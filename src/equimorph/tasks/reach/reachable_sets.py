@@ -17,7 +17,7 @@ from equimorph.structures import State, States
 from equimorph.tasks.reach.query import Answer, query_region
 from equimorph.tasks.reach.regions import BoundaryPiece, Region
 from equimorph.tasks.stable_part import cell_near, stable_piece
-from equimorph.tasks.start import check_stable
+from equimorph.tasks.start import check_cells, check_stable
 
 FINER = (0.1, 0.03)
 """Accuracies of a set, tried in turn if edges could not be cut."""
@@ -203,8 +203,7 @@ def _stable_piece(
     eset: EquilibriumSet, state: State, within: tuple[Constraint, ...]
 ) -> EquilibriumSet:
     """Stable cells around a state that obey all constraints."""
-    if len(eset.cells) == 0:
-        raise InputError("`eset` must have cells; got an empty set.")
+    check_cells(eset)
     check_stable("state", state)
     for constraint in within:
         if constraint.excess(state.z[None], state.p[None])[0] > 0.0:

@@ -166,7 +166,9 @@ def imperfection_law(
     if load == imperfection:
         raise InputError(f"`imperfection` must not be the load; got {load!r}.")
     if len(tried) < 3 or not (np.diff(tried) < 0.0).all():
-        raise InputError(f"`sizes` must be three or more numbers > 0 that fall; got {sizes!r}.")
+        raise InputError(
+            f"`sizes` must be three or more positive numbers in decreasing order; got {sizes!r}."
+        )
     trials = _Trials(start, load, place, tuple(within))
     loads = trials.loads(tried)
     while (fit := _best_fit(tried, trials.falls(loads))).error > SETTLED:

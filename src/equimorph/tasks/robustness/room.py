@@ -124,7 +124,7 @@ def stable_room(  # all but two by keyword
     places = np.array([position(structure.parameters, name) for name in tolerances], dtype=int)
     widths = np.array([float(value) for value in tolerances.values()])
     if len(widths) == 0:
-        raise InputError(f"`tolerances` must be positive numbers; got {dict(tolerances)!r}.")
+        raise InputError("`tolerances` must name at least one parameter; got none.")
     check_starts(batch)
     if (batch.index != 0).any():
         raise InputError("`states` must be stable; got unstable ones.")

@@ -14,6 +14,7 @@ from equimorph.equilibria import lift, way_points
 from equimorph.errors import InputError
 from equimorph.model import Constraint, Schedule, names_of, position
 from equimorph.structures import State, States
+from equimorph.tasks.start import check_schedule
 
 CONFIDENT = 1.96
 """Standard deviations of the interval around the share of successes: 95 %."""
@@ -128,7 +129,7 @@ def random_trials(  # all but three by keyword
     places = np.array([position(structure.parameters, name) for name in names], dtype=int)
     widths = np.array([float(value) for value in spreads.values()])
     if len(widths) == 0:
-        raise InputError(f"`spreads` must be positive numbers; got {dict(spreads)!r}.")
+        raise InputError("`spreads` must name at least one parameter; got none.")
     rows = _rows(start, schedule)
     offsets = np.random.default_rng(seed).normal(size=(trials, len(names))) * widths
     shift = np.zeros((trials, len(start.p)))
@@ -151,10 +152,7 @@ def _rows(
     """All parameters at the corners after the start."""
     if not isinstance(schedule, Schedule):
         return np.array(way_points(start.structure, start.p, list(schedule)))[1:]
-    if schedule.names != names_of(start.structure.parameters):
-        raise InputError(
-            f"`schedule` must give the parameters of the structure; got {schedule.names}."
-        )
+    check_schedule(schedule, start.structure)
     corners: Int[np.ndarray, " n"] = schedule.way_points
     steps = corners[corners > 0] if len(corners) > 1 else np.arange(1, len(schedule.values))
     return np.asarray(schedule.values[steps])

@@ -28,6 +28,7 @@ from equimorph.tasks.shapes.prediction import (
     twin_guesses,
 )
 from equimorph.tasks.stable_part import feasible_vertices, stable_vertices
+from equimorph.tasks.start import check_cells
 from equimorph.tolerances import SAME_STATE
 
 AT_EDGE = 1e-9
@@ -249,8 +250,7 @@ def _numbers(
             "`targets` must give equally many values of each descriptor; got "
             f"{', '.join(f'{len(v)} of {d.name}' for d, v in targets.items())}."
         )
-    if not len(eset.cells):
-        raise InputError("`eset` must have cells; got an empty set.")
+    check_cells(eset)
     return np.stack([np.asarray(value, dtype=float) for value in targets.values()], axis=1)
 
 

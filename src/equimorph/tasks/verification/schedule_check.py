@@ -25,7 +25,7 @@ from equimorph.model import Constraint, Descriptor, Schedule, names_of
 from equimorph.structures import State, States, Structure, from_identity, join_states
 from equimorph.tasks.distances import path_lengths
 from equimorph.tasks.route import FINE, describe_obstacle, describe_place, schedule_of
-from equimorph.tasks.start import inadmissible
+from equimorph.tasks.start import check_schedule, inadmissible
 from equimorph.tasks.verification.proof import Proof, prove
 from equimorph.tolerances import SAME_STATE
 
@@ -288,12 +288,7 @@ def _legs(
         check_start(start)
         return start, _moving(np.array(way_points(start.structure, start.p, schedule)))
     begin = start or first_state(schedule, structure)
-    names = names_of(begin.structure.parameters)
-    if schedule.names != names:
-        raise InputError(
-            f"`schedule` must give the parameters {', '.join(names)}; "
-            f"got {', '.join(schedule.names)}."
-        )
+    check_schedule(schedule, begin.structure)
     check_start(begin)
     if not np.allclose(schedule.values[0], begin.p, rtol=0, atol=1e-9):
         raise InputError(
