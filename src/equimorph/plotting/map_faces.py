@@ -1,6 +1,7 @@
 """Faces of a map over a grid: triangles where it is smooth, cells cut in two where it is not."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -73,11 +74,19 @@ def _triangles(whole: Bool[np.ndarray, "_ _"]) -> Int[np.ndarray, "triangles 3"]
     return np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
 
 
+class _Crossing(NamedTuple):
+    """A place on the rim of a cell; around: its distance from the first corner, 0 to 4."""
+
+    around: float
+    x: float
+    y: float
+
+
 def _crossings(
     axes: tuple[Axis, Axis], cuts: Float[np.ndarray, "points 2"]
-) -> dict[tuple[int, int], list[tuple[float, float, float]]]:
-    """Places on the rims of cells: distance around from the first corner (0 to 4), and place."""
-    found: dict[tuple[int, int], list[tuple[float, float, float]]] = {}
+) -> dict[tuple[int, int], list[_Crossing]]:
+    """Places on the rims of cells, by the cells."""
+    found: dict[tuple[int, int], list[_Crossing]] = {}
     shape = [len(axis) - 1 for axis in axes]
     steps = [axis[1] - axis[0] for axis in axes]
     for place in cuts:
@@ -92,7 +101,7 @@ def _crossings(
                 if 0 <= cell[0] < shape[across]:
                     key = cell if across == 0 else cell[::-1]
                     where = _around(across, low, share)
-                    found.setdefault(key, []).append((where, float(place[0]), float(place[1])))
+                    found.setdefault(key, []).append(_Crossing(where, *place.tolist()))
             break
     return found
 
@@ -105,7 +114,7 @@ def _around(across: int, low: bool, share: float) -> float:
 
 
 def _pieces(
-    axes: tuple[Axis, Axis], cell: tuple[int, int], crossed: list[tuple[float, float, float]]
+    axes: tuple[Axis, Axis], cell: tuple[int, int], crossed: list[_Crossing]
 ) -> list[tuple[Float[np.ndarray, "_ 2"], list[tuple[int, int]]]]:
     """Polygons into which a cell is cut, with the corners (vertices of the grid) of each."""
     i, j = cell

@@ -72,7 +72,7 @@ def _surfaces(states: States) -> bytes:
     columns["white"] = np.repeat(np.concatenate([mesh.white for mesh in meshes]), 3)
     points = np.concatenate([mesh.corners.reshape(-1, 3) for mesh in meshes])
     ends = 3 * np.arange(1, len(points) // 3 + 1)
-    return vtp_file(points, "Polys", (np.arange(len(points)), ends), columns, {})
+    return vtp_file(points, "Polys", np.arange(len(points)), ends, columns, {})
 
 
 def _centre_lines(states: States) -> bytes:
@@ -86,4 +86,4 @@ def _centre_lines(states: States) -> bytes:
     columns["radius"] = np.full(count * each, RADIUS * _size(states))
     ends = each * np.arange(1, count + 1)
     points = shapes.reshape(-1, 3)
-    return vtp_file(points, "Lines", (np.arange(len(points)), ends), columns, {})
+    return vtp_file(points, "Lines", np.arange(len(points)), ends, columns, {})

@@ -156,13 +156,14 @@ def _vtp(surface: _Surface) -> bytes:
     group, _ = SIMPLEX[surface.cells.shape[1]]
     ends = surface.cells.shape[1] * np.arange(1, len(surface.cells) + 1)
     corners = surface.cells.ravel()
-    return vtp_file(surface.points, group, (corners, ends), surface.on_points, surface.on_cells)
+    return vtp_file(surface.points, group, corners, ends, surface.on_points, surface.on_cells)
 
 
 def vtp_file(
     points: Float[np.ndarray, "points 3"],
     group: str,
-    cells: tuple[Int[np.ndarray, " corners"], Int[np.ndarray, " cells"]],
+    corners: Int[np.ndarray, " corners"],
+    ends: Int[np.ndarray, " cells"],
     on_points: dict[str, Shaped[np.ndarray, "..."]],
     on_cells: dict[str, Shaped[np.ndarray, "..."]],
 ) -> bytes:
@@ -174,12 +175,11 @@ def vtp_file(
         Places.
     group
         "Lines" or "Polys".
-    cells
+    corners, ends
         Corners of all cells one after the other, and where each cell ends.
     on_points, on_cells
         Numbers or vectors by name.
     """
-    connectivity, ends = cells
     number = dict.fromkeys(("Verts", "Lines", "Strips", "Polys"), 0)
     number[group] = len(ends)
     counts = " ".join(f'NumberOf{name}="{count}"' for name, count in number.items())
@@ -188,7 +188,7 @@ def vtp_file(
         '<VTKFile type="PolyData" version="1.0" byte_order="LittleEndian" header_type="UInt64">',
         f'<PolyData><Piece NumberOfPoints="{len(points)}" {counts}>',
         _data("Points", {"Points": points}),
-        _data(group, {"connectivity": connectivity, "offsets": ends}),
+        _data(group, {"connectivity": corners, "offsets": ends}),
         _data("PointData", on_points),
         _data("CellData", on_cells),
         "</Piece></PolyData></VTKFile>\n",

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float
@@ -32,6 +33,14 @@ class BranchEnds(Exception):  # noqa: N818  # names what happened, to the fit al
     """Too many trials were not reached."""
 
 
+class Accepted(NamedTuple):
+    """Unknowns that were accepted, with their residuals and the Jacobian of these."""
+
+    x: Vector
+    residuals: Residuals
+    jacobian: Jacobian
+
+
 @dataclass
 class Branch:
     """States at trial values of the unknowns, lifted from those of the last accepted ones.
@@ -48,7 +57,7 @@ class Branch:
     p: Parameters
     x: Vector
     trial: tuple[Lanes, Parameters] | None = None
-    accepted: tuple[Vector, Residuals, Jacobian] | None = None
+    accepted: Accepted | None = None
     failure: tuple[str, str] = ("", "")
     failures: int = 0
 
@@ -86,7 +95,7 @@ class Branch:
         moves = -structure.solve(z, p, columns).x
         slopes = [self._slope(k, np.ascontiguousarray(moves[:, k])) for k in range(len(x))]
         jacobian = np.stack([self._at_measurements(slope) for slope in slopes], axis=1)
-        self.accepted = x.copy(), self._misfit(structure, z, p), jacobian
+        self.accepted = Accepted(x.copy(), self._misfit(structure, z, p), jacobian)
         return jacobian
 
     def _structures_near(self, k: int) -> Callable[[float], Structure]:
