@@ -4,7 +4,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property
-from typing import Any, Protocol, overload
+from typing import Any, Protocol, overload, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -190,6 +190,7 @@ class States:
         return self.structure.drawing(self.z, self.p)
 
 
+@runtime_checkable
 class Points(Protocol):
     """What has unknowns and parameters: states, one or several, and points of other records."""
 

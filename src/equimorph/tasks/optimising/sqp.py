@@ -1,6 +1,6 @@
 """Sequential quadratic programming on an equilibrium set, many starts at a time.
 
-See docs/decisions.md, "Optima by our own SQP".
+See docs/decisions.md, "Optima come from an SQP method of this package".
 """
 
 from dataclasses import dataclass, replace

@@ -136,8 +136,8 @@ class Shapes:
     def _known(self) -> Predictor:
         if self.known is None:
             raise InputError(
-                "`Shapes` read from a file must be solved again for what its set knows; got one "
-                "without the set."
+                "`Shapes` must know their set; got some from a file, which does not hold it and "
+                "must be solved again."
             )
         return self.known
 
