@@ -19,7 +19,7 @@ from equimorph.manifold.complex.kept_sets import Effort, question_of_set, recall
 from equimorph.manifold.geometry.setting import Setting
 from equimorph.manifold.lifting.cells import CellFinder, Cells, account
 from equimorph.manifold.lifting.completeness import Check, check, recover
-from equimorph.manifold.lifting.crossing_branches import flood_crossings
+from equimorph.manifold.lifting.crossing_branches import flood_crossings, ring_middles
 from equimorph.manifold.lifting.flood import flood
 from equimorph.manifold.lifting.grid import (
     Lines,
@@ -354,8 +354,8 @@ def _lift_grid(
         if cells.doubtful == 0 or last:
             break
         bisected += cells.doubtful
-        chosen, exits = _longest_edges(pairing, cells), unseen.exits
-        # first those through which tongues leave their cells
+        chosen, exits = _longest_edges(pairing, cells), unseen.exits | ring_middles(pairing)
+        # first those through which tongues and strips leave their cells
         chosen = np.concatenate([np.array(list(exits), int), np.setdiff1d(chosen, list(exits))])
         pairing.use_mesh(bisect(pairing.mesh, chosen, exits))
     return cells, bisected

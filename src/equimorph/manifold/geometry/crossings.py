@@ -115,6 +115,20 @@ def crossing_frames(setting: Setting, z: Lanes, p: Parameters, rows: Rows) -> tu
     return within @ kernel, slopes
 
 
+def crossing_directions(setting: Setting, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes 2"]:
+    """Unit vectors, in two scaled free parameters, along the curve on which two sheets cross.
+
+    There the Hessian of the reduced equation has rank two; its null vector is the tangent.
+    """
+    kernel, hessian = _kernel(setting, z, p)
+    values, vectors = np.linalg.eigh(hessian)
+    lanes = np.arange(len(z))
+    null = vectors[lanes, :, np.abs(values).argmin(axis=1)]
+    along = np.einsum("lk,lkc->lc", null, kernel)[:, -2:]
+    length = np.linalg.norm(along, axis=1, keepdims=True)
+    return np.asarray(along / np.maximum(length, 1e-300))
+
+
 def _kernel(
     setting: Setting, z: Lanes, p: Parameters
 ) -> tuple[Float[np.ndarray, "lanes k full"], Float[np.ndarray, "lanes k k"]]:

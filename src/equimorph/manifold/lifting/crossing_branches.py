@@ -16,7 +16,7 @@ from equimorph.equilibria.trace_options import EventCode
 from equimorph.manifold.complex.marked_complex import TRIANGLES
 from equimorph.manifold.geometry.crossings import reduction
 from equimorph.manifold.geometry.points import VertexKind
-from equimorph.manifold.lifting.edges import EFFORTS
+from equimorph.manifold.lifting.edges import EFFORTS, NOISE
 from equimorph.manifold.lifting.flood import flood
 from equimorph.manifold.lifting.pairing import Pairing
 from equimorph.manifold.lifting.seeds import Seeds, polish
@@ -61,6 +61,30 @@ def lonely(pairing: Pairing) -> Items:
     for arc in (arc for edge, own in pairing.arcs.items() if used[edge] for arc in own):
         through[arc[CROSSING_OF_ARC]] += 1
     return np.array([point for point, count in through.items() if 0 < count != CURVES], int)
+
+
+def ring_middles(pairing: Pairing) -> dict[int, float]:
+    """Edges over which curves between two crossings close, with the part of the way in the middle.
+
+    Such a ring reaches neither end: where a side branch leaves a symmetric sheet and comes back to
+    it within an edge, as over strips that are narrower than the grid, a vertex must lie inside.
+    """
+    mesh, setting, store = pairing.mesh, pairing.setting, pairing.points
+    alone = lonely(pairing)
+    edges = store.edge[alone]
+    ends = mesh.vertices[mesh.edges[edges]] / setting.scales
+    way = ends[:, 1] - ends[:, 0]
+    place = store.p[alone][:, setting.free] / setting.scales - ends[:, 0]
+    shares = (place * way).sum(axis=1) / (way**2).sum(axis=1)
+    middles = {}
+    for edge in np.unique(edges).tolist():
+        own = np.sort(shares[edges == edge])
+        gaps = np.diff(own)
+        apart = np.flatnonzero(gaps > NOISE)
+        if len(apart):
+            nearest = apart[gaps[apart].argmin()]
+            middles[edge] = float(own[nearest : nearest + 2].mean())
+    return middles
 
 
 def _trace_again(pairing: Pairing, alone: Items) -> None:

@@ -9,9 +9,9 @@ that are joined between them, by a neck that is smaller than the triangle.
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 
-from equimorph.arrays import Flags, Pairs, Places, Some, Values
+from equimorph.arrays import Flags, Pairs, Parameters, Places, Some, Values
 from equimorph.columns import Columns
 from equimorph.manifold.geometry.exact_points import pin
 from equimorph.manifold.geometry.points import VertexKind
@@ -52,20 +52,30 @@ class FoldChords(Columns):
         return np.where(self.cusped, 1.0, turn)
 
 
-def fold_chords(pairing: Pairing, cells: Cells, wanted: Bool[np.ndarray, " T"]) -> FoldChords:
-    """Chords between folds on two sides of one grid triangle, of the flagged ones."""
+def chords_across(
+    pairing: Pairing, chords: Pairs, wanted: Bool[np.ndarray, " T"]
+) -> tuple[Int[np.ndarray, "chosen 2"], Some]:
+    """Chords between points on two sides of one grid triangle, of the flagged ones; triangles."""
     points, mesh = pairing.points, pairing.mesh
-    edge = points.edge[cells.folds]
+    edge = points.edge[chords]
     own = (edge >= 0).all(axis=1) & (edge[:, 0] != edge[:, 1])
-    ends, edge = cells.folds[own], edge[own]
+    ends, edge = chords[own], edge[own]
     owner = np.flatnonzero(wanted)
+    if len(owner) == 0:
+        return ends[:0], owner
     sides, base = np.sort(mesh.sides[owner], axis=1), len(mesh.edges)
     keys = np.concatenate([sides[:, a] * base + sides[:, b] for a, b in ((0, 1), (1, 2), (0, 2))])
     order = np.argsort(keys)
     sought = edge.min(axis=1) * base + edge.max(axis=1)
     at = order[np.minimum(np.searchsorted(keys[order], sought), len(order) - 1)]
     good = keys[at] == sought
-    ends, triangle = ends[good], np.tile(owner, 3)[at[good]]
+    return ends[good], np.tile(owner, 3)[at[good]]
+
+
+def fold_chords(pairing: Pairing, cells: Cells, wanted: Bool[np.ndarray, " T"]) -> FoldChords:
+    """Chords between folds on two sides of one grid triangle, of the flagged ones."""
+    ends, triangle = chords_across(pairing, cells.folds, wanted)
+    points = pairing.points
     used, place = np.unique(ends, return_inverse=True)
     forms, place = fold_forms(pairing.setting, points, used), place.reshape(ends.shape)
     length = np.linalg.norm(forms.existence, axis=1, keepdims=True)
@@ -93,18 +103,21 @@ class Turns(Columns):
 
 def sharp_turns(pairing: Pairing, chords: FoldChords) -> Turns | None:
     """Folds that turn sharply, with their middles; None if there are none."""
-    mesh, setting, points = pairing.mesh, pairing.setting, pairing.points
     sharp = chords.take(chords.cosines < SHARP)
     known = np.array([chord_of(*pair) in pairing.tips for pair in sharp.ends.tolist()], bool)
     sharp = sharp.take(~known)
     if len(sharp.ends) == 0:
         return None
     span = planes(pairing, sharp.triangle.tolist())
-    middle = pin(setting, points, sharp.ends.tolist(), VertexKind.FOLD, span)
-    corners = mesh.vertices[mesh.triangles[sharp.triangle]]
-    shares = shares_in(corners, middle.p[:, setting.free])
-    inside = middle.found & (shares > BEYOND).all(axis=1)
+    middle = pin(pairing.setting, pairing.points, sharp.ends.tolist(), VertexKind.FOLD, span)
+    inside = middle.found & lie_inside(pairing, sharp.triangle, middle.p)
     return Turns(sharp.ends, sharp.triangle, sharp.normals, middle.z, middle.p, inside)
+
+
+def lie_inside(pairing: Pairing, triangle: Some, p: Parameters) -> Flags:
+    """Whether parameters lie inside their grid triangles, or only a little beyond."""
+    corners = pairing.mesh.vertices[pairing.mesh.triangles[triangle]]
+    return np.asarray((shares_in(corners, p[:, pairing.setting.free]) > BEYOND).all(axis=1))
 
 
 @dataclass(frozen=True)
@@ -161,3 +174,43 @@ def _meetings(pairing: Pairing, chords: FoldChords) -> Places:
     ends = pairing.points.p[chords.ends][:, :, pairing.setting.free] / scales
     level = (chords.normals * ends).sum(axis=2)
     return np.asarray((np.linalg.pinv(chords.normals) @ level[:, :, None])[:, :, 0] * scales)
+
+
+@dataclass(frozen=True)
+class WaysOut(Columns):
+    """Where the tangents at both ends of chords lead out of their triangles.
+
+    apexes (n, 2): number, in the triangle, of the corner opposite the side; middle (n, 3):
+    barycentric coordinates of the middle between both places.
+    """
+
+    apexes: Pairs
+    middle: Float[np.ndarray, "n 3"]
+
+
+def ways_out(
+    pairing: Pairing,
+    ends: Pairs,
+    triangle: Some,
+    normals: Float[np.ndarray, "n 2 d"],
+) -> WaysOut:
+    """Follow curves in the parameters straight from both their ends out of grid triangles.
+
+    `normals` are those to the curves, in scaled free parameters.
+    """
+    mesh, setting = pairing.mesh, pairing.setting
+    corners = mesh.vertices[mesh.triangles[triangle]]
+    across = np.stack([-normals[..., 1], normals[..., 0]], axis=-1) * setting.scales
+    apexes, places = [], []
+    for k in range(2):
+        start = pairing.points.p[ends[:, k]][:, setting.free]
+        shares = shares_in(corners, start)
+        rates = shares_in(corners, start + across[:, k]) - shares
+        # into the triangle, off the side on which the end lies
+        own = shares.argmin(axis=1)[:, None]
+        rates *= np.sign(np.take_along_axis(rates, own, axis=1))
+        way = np.where(rates < 0.0, shares / np.where(rates < 0.0, -rates, 1.0), np.inf)
+        np.put_along_axis(way, own, np.inf, axis=1)
+        apexes.append(way.argmin(axis=1))
+        places.append(shares + way.min(axis=1, keepdims=True) * rates)
+    return WaysOut(np.stack(apexes, axis=1), 0.5 * (places[0] + places[1]))

@@ -11,14 +11,15 @@ from jaxtyping import Bool, Float
 from equimorph.arrays import CellFlags, Place, Some
 from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.setting import Setting
-from equimorph.manifold.geometry.simplices import shares_in
 from equimorph.manifold.lifting.cells import Cells, Seen
+from equimorph.manifold.lifting.crossing_chords import crossing_turns
 from equimorph.manifold.lifting.fold_chords import (
     Turns,
     beyond_folds,
     facing_folds,
     fold_chords,
     sharp_turns,
+    ways_out,
 )
 from equimorph.manifold.lifting.pairing import Pairing
 from equimorph.manifold.lifting.polygon_cuts import chord_of
@@ -65,13 +66,14 @@ class UnseenFinder:
         if d == 1:  # edges are traced, and have no inside besides
             return cells
         seen = Seen.of(pairing)
-        wanted = ~seen.same(self._seen) & ~_crossed(pairing)
+        new, crossed = ~seen.same(self._seen), _crossed(pairing)
+        wanted = new & ~crossed
         flags = wanted if d == 2 else wanted[mesh.faces].any(axis=1)
         flags[self._hidden] = True  # they wait for bisection
         found = [_holes(pairing, cells, flags)]
         if d == 2:
-            found.append(_necks(pairing, cells, flags))
-        self.exits = found[-1].exits
+            found += [_necks(pairing, cells, flags), _strips(pairing, cells, new & crossed)]
+        self.exits = {edge: share for each in found for edge, share in each.exits.items()}
         self._seen = seen
         before = np.zeros((0, d)) if self._touching is None else self._touching
         places = np.concatenate([before, *(each.touching for each in found)])
@@ -115,6 +117,16 @@ def _necks(pairing: Pairing, cells: Cells, wanted: Bool[np.ndarray, " T"]) -> Un
     return Unseen(hidden, touching, _exits(pairing, outside))
 
 
+def _strips(pairing: Pairing, cells: Cells, wanted: Bool[np.ndarray, " T"]) -> Unseen:
+    """Triangles that crossings of sheets leave through a side which does not show it."""
+    turns = crossing_turns(pairing, cells, wanted)
+    nowhere = np.zeros((0, pairing.mesh.dimension))
+    if turns is None:
+        return Unseen(np.zeros(0, int), nowhere)
+    outside = turns.take(~turns.inside)
+    return Unseen(outside.triangle, nowhere, _exits(pairing, outside))
+
+
 def _enter_tips(pairing: Pairing, turns: Turns) -> None:
     """Points of folds that turn sharply in their triangles: their chords are parted there."""
     for k, (one, other) in enumerate(turns.ends.tolist()):
@@ -124,26 +136,14 @@ def _enter_tips(pairing: Pairing, turns: Turns) -> None:
 
 
 def _exits(pairing: Pairing, turns: Turns) -> dict[int, float]:
-    """Edges to which folds lead straight from both their ends; the middle between where they do."""
-    mesh, setting = pairing.mesh, pairing.setting
-    corners = mesh.vertices[mesh.triangles[turns.triangle]]
-    across = np.stack([-turns.normals[..., 1], turns.normals[..., 0]], axis=-1) * setting.scales
-    apexes, places = [], []
-    for k in range(2):
-        start = pairing.points.p[turns.ends[:, k]][:, setting.free]
-        shares = shares_in(corners, start)
-        rates = shares_in(corners, start + across[:, k]) - shares
-        # into the triangle, off the side on which the end lies
-        own = shares.argmin(axis=1)[:, None]
-        rates *= np.sign(np.take_along_axis(rates, own, axis=1))
-        way = np.where(rates < 0.0, shares / np.where(rates < 0.0, -rates, 1.0), np.inf)
-        np.put_along_axis(way, own, np.inf, axis=1)
-        apexes.append(way.argmin(axis=1))
-        places.append(shares + way.min(axis=1, keepdims=True) * rates)
-    exits, middle = {}, 0.5 * (places[0] + places[1])
-    for k in np.flatnonzero(apexes[0] == apexes[1]).tolist():
+    """Edges to which curves lead straight from both their ends; where, in the middle of both."""
+    mesh = pairing.mesh
+    exits: dict[int, float] = {}
+    ways = ways_out(pairing, turns.ends, turns.triangle, turns.normals)
+    apexes, middle = ways.apexes, ways.middle
+    for k in np.flatnonzero(apexes[:, 0] == apexes[:, 1]).tolist():
         # sides are ab, bc, ca
-        first, last = (int(apexes[0][k] + turn) % 3 for turn in (1, 2))
+        first, last = (int(apexes[k, 0] + turn) % 3 for turn in (1, 2))
         side = int(mesh.sides[turns.triangle[k], first])
         turned = mesh.triangles[turns.triangle[k], first] != mesh.edges[side, 0]
         share = float(middle[k, first if turned else last])

@@ -1,0 +1,59 @@
+"""Side branches that leave a symmetric sheet and come back to it: tubes narrower than the grid."""
+
+import numpy as np
+import pytest
+
+import equimorph as em
+from oracles.complexes import assert_faithful
+from typecheck import unchecked
+
+BOX = em.Box(a=(-1.0, 1.1), b=(-1.0, 1.2))
+SLANT = 0.13
+
+
+def tube(squared_width, sign=1):
+    """x (x² + (a − slant·b)² − w²) = 0: a plane, and a tube of half the width w around it."""
+    energy = f"{sign} * (x**4/4 + ((a - {SLANT}*b)**2 - ({squared_width})) * x**2/2)"
+    parameters = [
+        em.Parameter("a", "1", 1.0, "actuator", 0.0),
+        em.Parameter("b", "1", 1.0, "load", 0.0),
+    ]
+    return em.EnergyStructure(energy, [em.Unknown("x", "0", guesses=(-2.5, 3.5))], parameters)
+
+
+def lifted(structure, grid):
+    """Set without checks of shapes; those of the first test have them."""
+    with unchecked():
+        return em.equilibrium_set(structure, BOX, intervals=grid)
+
+
+@pytest.fixture(scope="module")
+def strip():
+    return em.equilibrium_set(tube("0.01"), BOX, intervals=(6, 6), checks=0)
+
+
+def test_a_strip_between_pitchforks_hangs_together(strip):
+    """Euler characteristic: plane 1, tube 0, less two segments."""
+    assert_faithful(strip)
+    assert strip.audit.euler_characteristic == -1
+
+
+@pytest.mark.parametrize(
+    ("squared_width", "sign", "euler"),
+    [("0.01", -1, -1), ("0.01*(0.5 - b)*(b + 0.5)", 1, 3)],
+    ids=["subcritical", "closed"],
+)
+def test_strips_on_another_grid(squared_width, sign, euler):
+    """A closed strip is a sphere: plane 1, sphere 2, less their common circle 0."""
+    eset = lifted(tube(squared_width, sign), (7, 9))
+    assert_faithful(eset)
+    assert eset.audit.euler_characteristic == euler
+
+
+def test_all_states_over_the_strip_are_in_the_set(strip):
+    """Three over |a − slant·b| < w, from x² = w² − (a − slant·b)²; one beside it."""
+    for b in np.linspace(-0.9, 1.1, 9):
+        inside = np.sort(strip.at(a=SLANT * b + 0.03, b=b).z[:, 0])
+        expected = np.sqrt(0.01 - 0.03**2) * np.array([-1, 0, 1])
+        np.testing.assert_allclose(inside, expected, atol=1e-9)
+        assert len(strip.at(a=SLANT * b + 0.13, b=b)) == 1
