@@ -248,7 +248,7 @@ def _between(a: Place, b: Place, share: float) -> Place:
     return np.asarray(a + (share - ASIDE) * (b - a) if on_line.any() else place)
 
 
-def longest_edges(mesh: BaseMesh, sides: Int[np.ndarray, "n sides"]) -> Items:
+def longest_edges(mesh: BaseMesh, sides: Int[np.ndarray, "rows sides"]) -> Items:
     """Return the longest edge, relative to the box, of each row, each once."""
     ends = mesh.vertices[mesh.edges[sides]] / np.ptp(mesh.vertices, axis=0)
     length = np.linalg.norm(ends[:, :, 0] - ends[:, :, 1], axis=2)
