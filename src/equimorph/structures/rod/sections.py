@@ -125,6 +125,12 @@ class _Shape(CrossSection):
         stiff = (young * second[0], young * second[1], shear * torsion, young * area)
         return SectionProperties(*stiff, heavy)
 
+    def _annulus(self, diameter: float, hole: float, system: UnitSystem) -> SectionProperties:
+        """Those of a circle with a circular hole."""
+        second = np.pi / 64.0 * (diameter**4 - hole**4)
+        area = np.pi / 4.0 * (diameter**2 - hole**2)
+        return self._stiffnesses(area, (second, second), 2.0 * second, system)
+
 
 @check_arguments
 @dataclass(frozen=True)
@@ -231,9 +237,7 @@ class Tube(_Shape):
                 f"`wall` of the tube must be at most half its diameter, {self.diameter!r}; got "
                 f"{self.wall!r}."
             )
-        second = np.pi / 64.0 * (d**4 - hole**4)
-        area = np.pi / 4.0 * (d**2 - hole**2)
-        return self._stiffnesses(area, (second, second), 2.0 * second, system)
+        return self._annulus(d, hole, system)
 
 
 @check_arguments
@@ -255,9 +259,7 @@ class Round(_Shape):
     word: ClassVar[str] = "round"
 
     def _in(self, system: UnitSystem) -> SectionProperties:
-        d = self._number("diameter", "length", system)
-        second = np.pi / 64.0 * d**4
-        return self._stiffnesses(np.pi / 4.0 * d**2, (second, second), 2.0 * second, system)
+        return self._annulus(self._number("diameter", "length", system), 0.0, system)
 
 
 @check_arguments

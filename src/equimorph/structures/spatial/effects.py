@@ -6,17 +6,9 @@ import numpy as np
 from jaxtyping import Float
 
 from equimorph.errors import InputError
+from equimorph.structures.rod import terms
 from equimorph.structures.rod.discretisation import Mesh
 from equimorph.structures.rod.profiles import at_nodes, inside
-from equimorph.structures.rod.terms import (
-    Couple,
-    Curvature,
-    LineLoad,
-    PointForce,
-    Pressure,
-    Tendon,
-    Term,
-)
 
 AXES = "tnb"
 """Axes of the cross-section: tangent, normal in the plane of a planar rod, binormal."""
@@ -60,22 +52,22 @@ def direction_in_space(value: object) -> Float[np.ndarray, "3"]:
     return np.append(given, np.zeros(3 - len(given)))
 
 
-def effects(term: Term, mesh: Mesh) -> SpatialEffects:
+def effects(term: terms.Term, mesh: Mesh) -> SpatialEffects:
     """Effects of a term on the nodes of a mesh whose element ends meet its breaks."""
     out = SpatialEffects.none(mesh)
     match term:
-        case LineLoad():
+        case terms.LineLoad():
             rho, unit = term.density().cumulate(mesh), direction_in_space(term.direction)
             out.force[:] = rho[..., None] * unit
             out.total[:] = rho[-1, -1] * unit
-        case PointForce():
+        case terms.PointForce():
             beyond, unit = inside(term.s, 2.0, mesh), direction_in_space(term.direction)
             out.force[:] = beyond[:, None, None] * unit
             out.total[:] = unit
-        case Curvature():
+        case terms.Curvature():
             there = inside(term.start, term.stop, mesh)[:, None]
             out.natural[..., AXES.index(term.about)] = there * at_nodes(term.profile(), mesh)
-        case Tendon():
+        case terms.Tendon():
             there = inside(term.start, term.stop, mesh)[:, None]
             left, aside = (there * at_nodes(each, mesh) for each in term.profiles())
             out.moment[..., 1], out.moment[..., 2] = -aside, left
@@ -83,7 +75,7 @@ def effects(term: Term, mesh: Mesh) -> SpatialEffects:
     return out
 
 
-def check_potential(name: str, term: Term) -> None:
+def check_potential(name: str, term: terms.Term) -> None:
     """Refuse what has no potential in space.
 
     Raises
@@ -91,12 +83,12 @@ def check_potential(name: str, term: Term) -> None:
     InputError
         For couples and pressure.
     """
-    if isinstance(term, Couple):
+    if isinstance(term, terms.Couple):
         raise InputError(
             f"`{name}` must have a potential; got a couple: about an axis that stays where it is, "
             "its work in space depends on the way. Turn a clamp, or use a pair of forces."
         )
-    if isinstance(term, Pressure):
+    if isinstance(term, terms.Pressure):
         raise InputError(
             f"`{name}` must have a potential; got pressure, which on a curve in space has none. "
             "Use a dead line load."

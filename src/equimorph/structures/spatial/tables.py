@@ -51,12 +51,7 @@ def equation_tables(
 ) -> tuple[np.ndarray, ...]:
     """What `derivative_kernels.equations_lanes` shares among lanes, after the pairs of its jets.
 
-    Parameters
-    ----------
-    model
-        The rod.
-    lengths
-        Half the stiffness of the lengths of unknown quaternions.
+    `lengths` are those of `step_tables`.
     """
     whole = np.ones(len(model.mesh.nodes))
     whole[model.unknown_nodes] = lengths
