@@ -334,8 +334,9 @@ export class View {
   }
 
   private addLabel(text: string, at: [number, number], kind: string): void {
-    const element = h("span", { class: `label ${kind}`, "aria-hidden": "true" }, text);
-    place(element, at);
+    const element = h("span", { class: `label ${kind}`, "aria-hidden": "true" }, text), half = kind === "axis" ? 4 * text.length : 10;
+    // names stay inside narrow pictures
+    place(element, [Math.max(half, Math.min(this.element.clientWidth - half, at[0])), at[1]]);
     this.overlay.append(element);
     this.labels.push(element);
   }

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 import equimorph as em
-from equimorph.manifold.geometry.exact_points import corrected_amid
-from equimorph.manifold.geometry.setting import embed
 from webpages import Opened
 
 pytestmark = pytest.mark.slow
 POINTS = 200
+STEP, ROUNDS = 1e-5, 5
+"""Step of differences, and Newton steps."""
 NEAR = 3e-3
 """Largest distance of drawn points from those of the exact state, in units of the length."""
 PICKED = """(seed) => {
@@ -60,20 +60,30 @@ def _page(browser, path: Path):
 
 
 def _exact(eset, cells, weights):
-    """Exact states next to interpolated ones: in the normal spaces of the cells there."""
-    place = embed(eset.setting, eset.points.z, eset.points.p)[cells]
-    sides = place[:, 1:] - place[:, :1]
-    bases, _ = np.linalg.qr(np.swapaxes(sides, 1, 2))
-    z, p, middle = (
-        np.einsum("nk,nkj->nj", weights, each)
-        for each in (eset.points.z[cells], eset.points.p[cells], place)
-    )
-    around = np.linalg.norm(sides, axis=2).max(axis=1)
-    found = corrected_amid(eset.setting, z, p, middle, np.swapaxes(bases, 1, 2), around)
-    assert found.found.all()
-    states = em.States(eset.structure, found.z, found.p)
-    assert states.residual.max() < 1e-9
-    return states
+    """Exact states next to interpolated ones, by Newton's method in the normals of their cells.
+
+    Derivatives are differences, independent of those of the package.
+    """
+    structure, free = eset.structure, eset.setting.free
+    size = eset.points.z.shape[1]
+    corners = np.concatenate([eset.points.z, eset.points.p[:, free]], axis=1)[cells]
+    x = np.einsum("nk,nkj->nj", weights, corners)
+    p = np.tile(eset.setting.base, (len(x), 1))
+
+    def residual(x):
+        p[:, free] = x[:, size:]
+        return structure.residual(x[:, :size], p)
+
+    tangents = corners[:, 1:] - corners[:, :1]
+    tangents /= np.linalg.norm(tangents, axis=2, keepdims=True)
+    steps = STEP * np.eye(x.shape[1])
+    for _ in range(ROUNDS):
+        slopes = [(residual(x + h) - residual(x - h)) / (2 * STEP) for h in steps]
+        whole = np.concatenate([np.stack(slopes, axis=2), tangents], axis=1)
+        value = np.concatenate([residual(x), np.zeros((len(x), len(free)))], axis=1)
+        x = x - np.linalg.solve(whole, value[:, :, None])[:, :, 0]
+    assert np.abs(residual(x)).max() < 1e-9
+    return em.States(structure, x[:, :size].copy(), p.copy())
 
 
 def test_states_under_random_pixels_are_close_to_exact_ones(arch_set, arch_page):
