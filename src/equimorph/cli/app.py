@@ -52,6 +52,7 @@ class Kind(StrEnum):
     drive = "drive"
     lee = "lee"
     maps = "maps"
+    motion = "motion"
     network = "network"
     spring = "spring"
     stack = "stack"
@@ -128,7 +129,8 @@ def new(
         typer.Option(
             help="What to begin with: a rod (arch, arm, beam, deep_arch, strip), a frame (lee, "
             "network), a truss (bridge, drive, stack, truss), an energy (column), maps, "
-            "the spring, measured shapes (calibration), or every question that there is (tasks)."
+            "the spring, measured shapes (calibration), motions in time (motion), or every "
+            "question that there is (tasks)."
         ),
     ] = Kind.arch,
 ) -> None:

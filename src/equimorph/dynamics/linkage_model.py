@@ -22,6 +22,7 @@ class LinkageModel(Model):
     def __init__(self, chained: Chained) -> None:
         self._chained, self.linkage = chained, chained.linkage
         self.structure, self.unit = chained.structure, chained.time
+        self.chain = self.linkage.lengths.shape[1] + 1
 
     def settings(self, p: Row) -> Settings:
         """Parameters and 1."""

@@ -80,6 +80,8 @@ class Model(ABC):
     """Whether its equations are others than those of the library."""
     unit: float
     """Time T of the model in the unit of schedules."""
+    chain: int = 0
+    """Number of points that are joined to a line each; 0: all of them."""
 
     @abstractmethod
     def reference(self, states: States) -> Float[np.ndarray, "lanes points space"]:

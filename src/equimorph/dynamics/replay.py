@@ -49,8 +49,8 @@ class Replay:
 
     Parameters
     ----------
-    structure
-        The structure.
+    start
+        Equilibrium of the library at the beginning.
     simulator
         Which one; "own" is not independent of the library.
     times
@@ -59,6 +59,10 @@ class Replay:
         All parameters at these times.
     points
         Places of the structure's points.
+    statics
+        Where they are in the equilibria of `lift`; nan where these have ended.
+    chain
+        Number of points that are joined to a line each, in order.
     deviation
         From the equilibria of `lift`; nan where these have ended.
     discretisation, dynamics
@@ -84,11 +88,13 @@ class Replay:
         not raise it, and all tell the same snap; "not checked" if that was not asked for.
     """
 
-    structure: Structure
+    start: State
     simulator: str
     times: Float[np.ndarray, " times"]
     parameters: Float[np.ndarray, "times parameters"]
     points: Float[np.ndarray, "times points space"]
+    statics: Float[np.ndarray, "times points space"]
+    chain: int
     deviation: Float[np.ndarray, " times"]
     discretisation: Float[np.ndarray, " times"]
     dynamics: Float[np.ndarray, " times"]
@@ -117,6 +123,11 @@ class Replay:
     def largest_deviation(self) -> float:
         """Largest deviation where there are equilibria of `lift`."""
         return float(np.nanmax(self.deviation))
+
+    @property
+    def structure(self) -> Structure:
+        """The structure."""
+        return self.start.structure
 
     @property
     def independent(self) -> bool:
@@ -298,7 +309,8 @@ def _judge(
     landed = landing(begin.structure, plant.guess(), rows[-1]) if gone else None
     late = float("nan") if where is None or fold is None else where - fold
     return Replay(
-        begin.structure, "mujoco" if model.independent else "own", times, rows, points,
+        begin, "mujoco" if model.independent else "own", times, rows, points, reference,
+        model.chain or points.shape[1],
         _largest(points - reference), _largest(course.points - reference),
         _largest(points - course.points), gone, where, fold, late, expected, landed,
         record.closure, np.array(record.energy),

@@ -11,7 +11,7 @@ from equimorph.plotting.maps import curvature_map, load_map
 from equimorph.plotting.margins import margins
 from equimorph.plotting.plane import parameter_plane, solutions
 from equimorph.plotting.reach import reach_panels, reach_parameters, reach_plane
-from equimorph.plotting.replays import deviation_over_time
+from equimorph.plotting.replays import deviation_over_time, replay_film
 from equimorph.plotting.robustness import imperfection_laws, room, sensitivities, trials
 from equimorph.plotting.route_panels import alternative_routes, route_panels
 from equimorph.plotting.schedule_strips import schedule_strips
@@ -43,6 +43,7 @@ __all__ = [
     "reach_panels",
     "reach_parameters",
     "reach_plane",
+    "replay_film",
     "room",
     "route_panels",
     "save",

@@ -92,7 +92,7 @@ def film(
         stage = _set_stage(states, board)
         pictures = _pictures(stage, states, board)
     file = FilePath(path)
-    _write(pictures, file, _durations(frames, fps))
+    write_gif(pictures, file, durations(frames, fps))
     return file
 
 
@@ -263,13 +263,13 @@ def _place_readings(
     return tuple(texts), list(zip(*printed, strict=True))
 
 
-def _durations(frames: int, fps: int) -> list[int]:
+def durations(frames: int, fps: int) -> list[int]:
     """Milliseconds that each picture stays; start and goal stay longer."""
     each = max(2, round(100 / fps)) * _HUNDREDTHS
     return [int(1000 * _PAUSE_FIRST), *[each] * (frames - 2), int(1000 * _PAUSE_LAST)]
 
 
-def _write(pictures: list[Image.Image], file: FilePath, durations: list[int]) -> None:
+def write_gif(pictures: list[Image.Image], file: FilePath, durations: list[int]) -> None:
     """Write an endless GIF with one palette, so that still parts cost nothing."""
     # The palette is made from pictures all along the way: none of the colours is missed.
     sample = [np.asarray(pictures[k]) for k in np.linspace(0, len(pictures) - 1, 4).astype(int)]

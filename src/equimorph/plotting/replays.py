@@ -1,17 +1,29 @@
 """Deviation of a replay from the equilibria, over time."""
 
+from pathlib import Path
+
 import numpy as np
+from jaxtyping import Float
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from PIL import Image
 
 from equimorph.argument_checks import check_arguments
 from equimorph.dynamics import Replay
 from equimorph.plotting import style
+from equimorph.plotting.film import durations, write_gif
+from equimorph.plotting.viewpoint import viewpoint_of
 from equimorph.tasks.timing.speed import SpeedLimit
 
 _SMALLEST = 1e-7
 """Least deviation that is drawn, relative to the largest."""
 
+_WIDTH, _HEIGHT, _DOTS = 6.4, 2.8, 120
+"""Inches of a frame, and pixels per inch."""
+_STATICS = "#cfcfcf"
+_ROOM = 0.08
+"""Empty room around shapes, relative to their size."""
 _AFTER = 1.25
 """End of the time axis relative to when a motion that snaps leaves: no deviation is known then."""
 
@@ -38,7 +50,7 @@ def deviation_over_time(
     with style.house_style():
         if ax is None:
             figure = style.attach_canvas(Figure(figsize=(style.SINGLE_COLUMN, 2.2)))
-            ax = figure.add_axes((0.17, 0.19, 0.79, 0.76))
+            ax = figure.add_axes((0.17, 0.19, 0.79, 0.69))
         floor = _SMALLEST * played.largest_deviation
         parts = (
             ("chain of links", played.discretisation, style.FAINT, 1.0),
@@ -65,8 +77,68 @@ def deviation_over_time(
         ax.set_xlim(0.0, last if played.where is None else min(last, _AFTER * played.where))
         ax.set_xlabel("time")
         ax.set_ylabel("largest deviation")
-        ax.legend(frameon=False, fontsize=6.5, loc="lower right")
+        ax.legend(
+            frameon=False, fontsize=6.5, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=4,
+            columnspacing=1.2, handlelength=1.5, borderaxespad=0.2,
+        )  # fmt: skip
     return ax
+
+
+@check_arguments
+def replay_film(played: Replay, path: str | Path, *, frames: int = 60, fps: int = 20) -> Path:
+    """Write an animated GIF: the structure in the simulator over its equilibria, and the deviation.
+
+    Parameters
+    ----------
+    played
+        The replay.
+    path
+        File to write; its folder must exist.
+    frames
+        Number of pictures, at least 2.
+    fps
+        Pictures per second.
+
+    Returns
+    -------
+    The file.
+    """
+    shown = np.unique(np.linspace(0, len(played.times) - 1, frames).round().astype(int))
+    figure = Figure(figsize=(_WIDTH, _HEIGHT), dpi=_DOTS)
+    canvas = FigureCanvasAgg(figure)
+    left = figure.add_axes((0.01, 0.02, 0.5, 0.96))
+    deviation_over_time(played, ax=figure.add_axes((0.62, 0.17, 0.35, 0.7)))
+    (now,) = figure.axes[1].plot([], [], "o", color=style.INK, ms=5, zorder=9)
+    moving, still = (_lines(played, each) for each in (played.points, played.statics))
+    lines = [
+        left.plot([], [], color=colour, linewidth=width)[0]
+        for colour, width in ((_STATICS, 4.0), (style.INDEX_COLOURS[0], 1.6))
+    ]
+    ends = [getattr(np, f"nan{end}")(moving, axis=(0, 1)) for end in ("min", "max")]
+    room = _ROOM * float((ends[1] - ends[0]).max())
+    left.set(xlim=(ends[0][0] - room, ends[1][0] + room), aspect="equal")
+    left.set_ylim(ends[0][1] - room, ends[1][1] + room)
+    left.axis("off")
+    pictures = []
+    for k in shown:
+        for line, places in zip(lines, (still, moving), strict=True):
+            line.set_data(*places[k].T)
+        now.set_data([played.times[k]], [max(played.deviation[k], 0.0)])
+        canvas.draw()
+        pictures.append(Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB"))
+    write_gif(pictures, Path(path), durations(len(pictures), fps))
+    return Path(path)
+
+
+def _lines(
+    played: Replay, points: Float[np.ndarray, "times points space"]
+) -> Float[np.ndarray, "times drawn 2"]:
+    """Points as they are seen, with a gap after each line."""
+    times, _, space = points.shape
+    chains = points.reshape(times, -1, played.chain, space)
+    gap = np.full((times, chains.shape[1], 1, space), np.nan)
+    drawn = np.concatenate([chains, gap], axis=2).reshape(times, -1, space)
+    return drawn if space == 2 else viewpoint_of(played.structure).flat(drawn)
 
 
 def _draw_bound(ax: Axes, played: Replay, limit: SpeedLimit) -> None:

@@ -15,6 +15,7 @@ from types import ModuleType
 from typing import Any
 
 from equimorph import tasks
+from equimorph.dynamics import Replay
 from equimorph.equilibria import Event, Landing, LimitLoad, Path
 from equimorph.errors import InputError
 from equimorph.manifold import Audit, Component, Snap, StabilityDistance, Stratum
@@ -25,7 +26,7 @@ from equimorph.tasks.reach.regions import Region
 
 OTHERS = (
     *(Audit, Component, Stratum, Snap, StabilityDistance),
-    *(Event, Landing, LimitLoad, Path, Schedule, Answer, Region),
+    *(Event, Landing, LimitLoad, Path, Replay, Schedule, Answer, Region),
 )
 """Records of the layers below the tasks, and those whose names other dataclasses have, too."""
 

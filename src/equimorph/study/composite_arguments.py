@@ -114,6 +114,24 @@ class ObjectiveArgument(Argument):
         ]
 
 
+class RatesArgument(Argument):
+    """Largest rates and, if wished, accelerations and jerks, by parameter."""
+
+    def keys(self) -> dict[str, tuple[Any, Any]]:
+        """Give the limits."""
+        limits = Annotated[dict[str, Positive], Field(min_length=1)]
+        more = (dict[str, Positive], {})
+        return {self.key: (limits, ...), "accelerations": more, "jerks": more}
+
+    def look_up(self, ground: Ground, section: Any, place: str) -> Any:
+        """Check names."""
+        limits = {key: getattr(section, key) for key in self.keys()}
+        for key, each in limits.items():
+            check_parameters(ground.structure, each, f"{place}.{key}")
+        with at_key(place):
+            return Rates(*limits.values())
+
+
 def _terms(given: Any) -> dict[str, float]:
     return {given: 1.0} if isinstance(given, str) else dict(given)
 

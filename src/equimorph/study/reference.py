@@ -36,6 +36,12 @@ SHARED = {
     "batch": "Lifts side by side.",
     "reach": "Longest extension of a tree, in scaled parameters.",
     "seed": "Seed of the random numbers.",
+    "accelerations": "Largest changes of rates per unit of time.",
+    "jerks": "Largest changes of accelerations per unit of time; they need accelerations.",
+    "links": "Links of each member of a chain.",
+    "step": "Step in time, in units of T.",
+    "damping": "Damping of elastic joints over their stiffness, in units of T.",
+    "hold": "Time for which the last parameters are held, in units of T.",
 }
 """Meanings of keys that several tables have."""
 

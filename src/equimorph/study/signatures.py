@@ -52,6 +52,12 @@ MEANINGS: Mapping[str, Any] = {
     "reach": Positive,
     "snap_price": Positive,
     "tolerance": Positive,
+    "rate": Positive,
+    "duration": Positive,
+    "sampling": Positive,
+    "step": Positive,
+    "hold": Positive,
+    "links": Annotated[int, Field(ge=2, le=1000)],
     "confidence": Annotated[float, Field(gt=0.5, lt=1.0)],
     "seed": Seed,
     "checks": Annotated[int, Field(ge=0, le=1000)],
@@ -133,6 +139,7 @@ Make = Callable[..., Argument]
 SORTS: tuple[tuple[Callable[[Form], bool], Make, Any], ...] = (
     (lambda form: form.is_any(State, States), given.StateArgument, StateSection),
     (lambda form: form.is_any(Schedule), composite.WayArgument, None),
+    (lambda form: form.kinds == (Rates,), composite.RatesArgument, None),
     (lambda form: form.is_any(Rates), composite.ObjectiveArgument, composite.Objective),
     (lambda form: form.is_any(Descriptor), given.DescriptorArgument, str),
     (lambda form: form.is_any(Box), given.BoxArgument, dict[str, Interval]),
@@ -224,7 +231,7 @@ def _argument(
 def _parts(options: type) -> tuple[Argument, ...]:
     """Fields of a dataclass of options, as arguments."""
     made = (
-        Argument(each.name, each.name, Form(each.name, (each.type,)).plain, each.default)
+        Argument(each.name, each.name, Form(each.name, alternatives(each.type)).plain, each.default)
         for each in fields(options)
     )
     return tuple(each for each in made if each.written is not None)

@@ -8,7 +8,17 @@ from equimorph.study.question import Kind
 
 ORDER = (
     *("route", "shape", "optimum", "robust_optimum", "landscape", "track", "follow"),
-    *("sampled_route", "reach", "verify", "sensitivity", "imperfection", "room", "snap"),
+    *(
+        "sampled_route",
+        "reach",
+        "verify",
+        "motion",
+        "replay",
+        "sensitivity",
+        "imperfection",
+        "room",
+        "snap",
+    ),
     *("snap_graph", "trials", "estimate", "calibration", "map", "strongest", "chart", "reduction"),
 )
 """Order in which kinds are answered and reported; further kinds follow by their names."""

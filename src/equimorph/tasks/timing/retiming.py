@@ -1,6 +1,6 @@
 """`retime`: a motion along a schedule with limited rates, accelerations and jerks."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -37,7 +37,7 @@ Scales = Float[np.ndarray, " parameters"]
 
 @check_arguments
 def retime(
-    schedule: Schedule,
+    schedule: Schedule | Sequence[Mapping[str, float]],
     rates: Rates,
     *,
     tolerance: float | None = None,
@@ -57,7 +57,7 @@ def retime(
     Parameters
     ----------
     schedule
-        A verified schedule; its own times do not count.
+        A verified schedule, whose own times do not count; or way-points, which need a `start`.
     rates
         Largest rates and, if wished, accelerations and jerks. They must limit every parameter that
         moves.
@@ -95,6 +95,11 @@ def retime(
     --------
     ``em.retime(route.schedule, em.Rates({"Theta": 0.5}, {"Theta": 2.0}), tolerance=0.02)``
     """
+    if not isinstance(schedule, Schedule):
+        first = verify(schedule, start, structure=structure, within=within, margin=margin)
+        if first.schedule is None:
+            return first
+        schedule = first.schedule
     rates.check_covers(schedule.moving)
     begin = start or first_state(schedule, structure)
     scales = begin.structure.scales

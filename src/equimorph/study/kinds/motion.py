@@ -1,0 +1,145 @@
+"""Motions in time, ``[[motion]]``, with the files that controllers read, and ``[[replay]]``."""
+
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+from types import MappingProxyType
+
+import numpy as np
+from pydantic import Field
+
+from equimorph import plotting
+from equimorph.dynamics import Replay, replay
+from equimorph.manifold import EquilibriumSet
+from equimorph.model import Schedule, names_of
+from equimorph.storage import write_trajectory
+from equimorph.storage.trajectory import trajectory_message
+from equimorph.study import html
+from equimorph.study.answers import as_route, figures_of_way, place_of
+from equimorph.study.fields import Positive
+from equimorph.study.lookup import at_key
+from equimorph.study.question import DataTable, Figure, Kind, Question, still
+from equimorph.tasks.timing.retiming import retime
+from equimorph.tasks.verification.schedule_check import Verification
+
+
+class MotionKind(Kind[Verification]):
+    """A motion along a schedule with limited rates, accelerations and jerks."""
+
+    table = "motion"
+    tasks = (retime,)
+    left_out = ("structure",)
+    within_set = True
+    own = MappingProxyType(
+        {
+            "joints": (
+                dict[str, str],
+                Field(
+                    default_factory=dict,
+                    description="Joints of a ROS 2 controller by parameter, for a trajectory file.",
+                ),
+            ),
+            "seconds": (
+                Positive | None,
+                Field(None, description="Length of the unit of time where it is not a second."),
+            ),
+        }
+    )
+
+    def look_up_more(self, question: Question) -> None:
+        """Refuse joints that a controller cannot move, before anything is computed."""
+        if not question.section.joints:
+            return
+        structure, parameters = question.structure, question.structure.parameters
+        names, roles, units = (
+            tuple(getattr(each, part) for each in parameters) for part in ("name", "role", "unit")
+        )
+        at_rest = np.zeros((1, len(parameters)))
+        none, unit = np.zeros(1), structure.time_unit
+        resting = Schedule(
+            names, roles, units, at_rest, none, none, {}, {}, times=none, time_unit=unit
+        )
+        with at_key(question.key):
+            trajectory_message(resting, question.section.joints, seconds=question.section.seconds)
+
+    def figures(
+        self, question: Question, eset: EquilibriumSet | None, answer: Verification
+    ) -> list[Figure]:
+        """As for a route."""
+        route = as_route(answer, "arrived" if answer.verified else "refused")
+        return figures_of_way(eset, question.files, route, "motion")
+
+    def words(self, question: Question, answer: Verification) -> str:
+        """Say how long it takes, and how near to instability it leads."""
+        schedule = answer.schedule
+        assert schedule is not None
+        time = f"{html.number(schedule.duration)} {schedule.time_unit}"
+        return (
+            f"**{time}** in {len(schedule.values)} samples, smallest margin "
+            f"{html.number(answer.margin)}."
+        )
+
+    def write_files(self, question: Question, answer: Verification, folder: Path) -> None:
+        """Write the schedule and, with joints, the trajectory for their controller."""
+        super().write_files(question, answer, folder)
+        joints, seconds = question.section.joints, question.section.seconds
+        if joints and answer.schedule is not None:
+            place = folder / f"{question.files}-trajectory.yaml"
+            write_trajectory(answer.schedule, place, joints, seconds=seconds)
+
+    def refusal(self, question: Question, answer: Verification) -> str:
+        """Reason why it cannot be executed."""
+        del question
+        return "" if answer.verified else f"{answer.why[:1].upper()}{answer.why[1:]}."
+
+
+class ReplayKind(Kind[Replay]):
+    """A schedule in time, played in a simulator that knows nothing of equilibria."""
+
+    table = "replay"
+    tasks = (replay,)
+    left_out = ("structure",)
+
+    def figures(
+        self, question: Question, eset: EquilibriumSet | None, answer: Replay
+    ) -> list[Figure]:
+        """Deviation over time, and a film beside the statics."""
+        del eset
+        name = f"{question.files}-film.gif"
+        deviation = still(
+            f"{question.files}-deviation", partial(plotting.deviation_over_time, answer),
+            "Largest distance of a point from its equilibrium, over time.",
+        )  # fmt: skip
+        caption = "The structure in the simulator, and in grey its equilibria."
+        return [deviation, Figure((name,), partial(_film, answer, name), caption, wide=True)]
+
+    def words(self, question: Question, answer: Replay) -> str:
+        """Say how far it was from its equilibria."""
+        independent = "" if answer.independent else ", which shares the library's equations"
+        checked = "" if answer.converged == "not checked" else f" ({answer.converged})"
+        return (
+            f"**no snap** in the simulator {answer.simulator}{independent}; deviation "
+            f"{html.number(answer.largest_deviation, 3)} at most{checked}."
+        )
+
+    def refusal(self, question: Question, answer: Replay) -> str:
+        """When it snapped, and where it came to rest."""
+        if not answer.snapped:
+            return ""
+        when = "" if answer.where is None else f" at the time {html.number(answer.where)}"
+        rest = answer.landed_in
+        names = names_of(answer.structure.parameters)
+        place = "" if rest is None else f"; it came to rest at {place_of(rest, names)}"
+        return f"In the simulator {answer.simulator} the structure snaps{when}{place}."
+
+    def tables(self, question: Question, answer: Replay) -> Sequence[DataTable]:
+        """Parameters and deviations over time."""
+        names = names_of(answer.structure.parameters)
+        parts = ("deviation", "discretisation", "dynamics")
+        columns = [answer.times, *answer.parameters.T, *(getattr(answer, each) for each in parts)]
+        rows = [["time", *names, *parts], *np.column_stack(columns).tolist()]
+        return [DataTable(f"{question.files}.csv", "deviation over time", rows)]
+
+
+def _film(played: Replay, name: str, folder: Path) -> None:
+    plotting.replay_film(played, folder / name)
