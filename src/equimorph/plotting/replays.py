@@ -1,6 +1,7 @@
 """Deviation of a replay from the equilibria, over time."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
@@ -105,7 +106,7 @@ def replay_film(played: Replay, path: str | Path, *, frames: int = 60, fps: int 
     """
     shown = np.unique(np.linspace(0, len(played.times) - 1, frames).round().astype(int))
     figure = Figure(figsize=(_WIDTH, _HEIGHT), dpi=_DOTS)
-    canvas = FigureCanvasAgg(figure)
+    canvas: Any = FigureCanvasAgg(figure)  # matplotlib's canvas has no types
     left = figure.add_axes((0.01, 0.02, 0.5, 0.96))
     deviation_over_time(played, ax=figure.add_axes((0.62, 0.17, 0.35, 0.7)))
     (now,) = figure.axes[1].plot([], [], "o", color=style.INK, ms=5, zorder=9)

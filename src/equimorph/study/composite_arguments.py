@@ -120,7 +120,7 @@ class RatesArgument(Argument):
     def keys(self) -> dict[str, tuple[Any, Any]]:
         """Give the limits."""
         limits = Annotated[dict[str, Positive], Field(min_length=1)]
-        more = (dict[str, Positive], {})
+        more: tuple[Any, Any] = (dict[str, Positive], {})
         return {self.key: (limits, ...), "accelerations": more, "jerks": more}
 
     def look_up(self, ground: Ground, section: Any, place: str) -> Any:
