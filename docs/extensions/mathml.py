@@ -20,7 +20,7 @@ def inline(writer, node):
 
 def block(writer, node):
     """Write a formula of its own."""
-    writer.body.append(f'<div class="math">{_markup(node, block=True)}</div>')
+    writer.body.append(f'<div class="formula">{_markup(node, block=True)}</div>')
     raise nodes.SkipNode
 
 
