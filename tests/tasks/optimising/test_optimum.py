@@ -166,7 +166,7 @@ def test_bad_questions_are_refused(level_set_of_spring, spring_set):
     with pytest.raises(InputError, match="`margin` must be a number >= 0"):
         em.optimise(eset, angle, margin=-1.0)
     unstable = next(s for s in eset.at(x_l=0.8) if not s.stable)
-    with pytest.raises(InputError, match="`start` must be stable; got index 1"):
+    with pytest.raises(InputError, match="`start` must be stable; got a state of index 1"):
         em.optimise(eset, angle, start=unstable)
     with pytest.raises(InputError, match="fixed parameters of the set"):
         em.optimise(eset, angle, start=next(iter(spring_set.at(x_l=1.2, F=0.1))))
