@@ -216,3 +216,17 @@ def test_paths_of_the_arch_hide_nothing():
     arch = em.Rod()
     path = em.lift(arch.natural_state(Theta=0.9, Delta=0.02), {"q": 8.0}, through_folds=True)
     assert [event.kind for event in path.events] == ["fold", "fold", "arrived"]
+
+
+def test_eigenvalues_of_opposite_signs_that_swap_are_no_event():
+    """Between −σ and σ the border of F_z is no eigenvector; its test function has a pole there."""
+    arch = em.Rod()
+    loaded = em.lift(arch.natural_state(Theta=1.0), {"q": 2.5}).end.state
+    ends = [
+        {"Theta": 1.613496231407899, "Delta": -0.337079180680602, "q": 2.4097057641696216},
+        {"Theta": 1.7011385501804561, "Delta": -0.38523334934925946, "q": 2.9560497587390016},
+    ]
+    start = em.lift(loaded, ends[0]).end.state
+    path = em.lift(start, ends[1])
+    assert path.arrived
+    assert path.states.margin.min() > 1.5

@@ -49,12 +49,17 @@ class Probe(Columns):
 
 
 def probe_at(curve: Curve, front: Front, length: Values) -> Probe:
-    """Eigenvalue nearest to zero, and its slope along the curve, at one point of each lane."""
+    """Eigenvalue nearest to zero, and its slope along the curve, at one point of each lane.
+
+    By the solution of ``F_z v = −g b``: the eigenvalue is −g, and v = b, where b is an eigenvector.
+    Between eigenvalues ±σ, b is none of either, and g has a pole; ``g/|v|`` is ±σ there, too.
+    """
     p = curve.parameters(front.t)
     b = null_border(curve.structure, front.z, p)
     at = Critical(curve.structure, front.z, p, b)
     slope = at.second(front.tangent_z, front.tangent_t[:, None] * curve.rate(front.t))
-    return Probe(front, -at.g, slope, length)
+    size = np.linalg.norm(at.v, axis=1)
+    return Probe(front, -at.g / size, slope / size**2, length)
 
 
 def inside_step(
