@@ -210,13 +210,13 @@ def of_another_structure(kinds: Sequence[Any], things: Things) -> Iterator[OfAno
 
 def public_functions(things: Things) -> Iterator[tuple[str, Callable[..., Any]]]:
     """Functions, classes and methods that users call."""
-    layers = ("charts", "equilibria", "manifold", "model", "structures", "tasks", "storage")
-    for layer in (*layers, "plotting"):
-        for name in getattr(em, layer).__all__:
-            thing = getattr(getattr(em, layer), name)
-            called = thing.__init__ if inspect.isclass(thing) else thing
-            if is_checked(called) and name not in LEFT_OUT:
-                yield f"{layer}.{name}", thing
+    named = {name: getattr(em, name) for name in em.__all__}
+    for layer in ("charts", "equilibria", "manifold", "model", "structures", "storage", "plotting"):
+        named |= {name: getattr(getattr(em, layer), name) for name in getattr(em, layer).__all__}
+    for name, thing in named.items():
+        called = thing.__init__ if inspect.isclass(thing) else thing
+        if is_checked(called) and name not in LEFT_OUT:
+            yield f"{thing.__module__}.{name}", thing
     pieces = em.components(things.set)
     for owner in (things.set, things.chart, things.map, things.state, things.path.states, pieces,
                   things.spring, things.rod, things.truss, things.frame):  # fmt: skip

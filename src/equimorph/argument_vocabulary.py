@@ -62,7 +62,6 @@ RANGES: Mapping[str, Range] = {
     **dict.fromkeys(("lower", "upper"), EXTENDED),
     **dict.fromkeys(("EI", "EI_out", "GJ", "EA", "E", "rest", "length"), POSITIVE),
     **dict.fromkeys(("mass", "masses", "duration", "rate", "hold", "dampings"), POSITIVE),
-    "damping": NOT_NEGATIVE,
     "links": count(2, 1000),
     **dict.fromkeys(("accelerations", "jerks", "sampling"), POSITIVE),
     **dict.fromkeys(("width", "thickness", "diameter", "wall", "density", "weight"), POSITIVE),
@@ -70,7 +69,9 @@ RANGES: Mapping[str, Range] = {
     "kinks": BETWEEN,
     "degree": count(3, 16),
     "margin": NOT_NEGATIVE,
-    "radius": Range(0.0, LARGEST, "a finite number >= 0", "finite numbers >= 0"),
+    **dict.fromkeys(
+        ("radius", "damping"), Range(0.0, LARGEST, "a finite number >= 0", "finite numbers >= 0")
+    ),
     "intervals": count(2, np.inf),
     "confidence": Range(0.5, 1.0 - 1e-12, "between 0.5 and 1", "between 0.5 and 1", above=True),
     "slide": Range(

@@ -7,13 +7,13 @@ import numpy as np
 from scipy.stats import chi2
 
 from equimorph.argument_checks import check_arguments
-from equimorph.arrays import Flags, Values
+from equimorph.arrays import Flags
 from equimorph.control.belief import Belief, ControlStatus
 from equimorph.control.estimate import Estimate, Measurement, fitted
 from equimorph.control.likely import Bundles, LikelyLoads, moved, positions
 from equimorph.control.moving_target import MovingTarget
 from equimorph.control.safe_routes import route_is_safe, safe_route
-from equimorph.control.strides import Strides
+from equimorph.control.strides import Strides, setting_of
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Constraint, Descriptor
@@ -335,14 +335,14 @@ class Controller:
         names, here = self.eset.names, belief.state.p[self._actuators]
         ahead = list(belief.way_points)
         while ahead and np.allclose(
-            _towards(ahead[0], names, here), here, rtol=0, atol=SAME_TO_ROUNDING
+            setting_of(ahead[0], names, here), here, rtol=0, atol=SAME_TO_ROUNDING
         ):
             ahead.pop(0)
         if not ahead and self._is_goal(belief.state.batch)[0]:
             return replace(belief, way_points=(), status=ControlStatus.ARRIVED)
         if not ahead:
             return self._replanned(belief, likely, place)
-        there = _towards(ahead[0], names, here)
+        there = setting_of(ahead[0], names, here)
         stride = self._strides.towards(belief.state, likely, place, there)
         if stride.state is not None:
             return replace(belief, state=stride.state, way_points=tuple(ahead))
@@ -395,8 +395,3 @@ def _end_of(goal: State | Route | Tracking) -> State:
         return goal
     assert goal.states is not None
     return goal.states[-1]
-
-
-def _towards(point: Command, names: tuple[str, ...], here: Values) -> Values:
-    """A way-point as an array; actuators that it does not name stay."""
-    return np.array([point.get(name, value) for name, value in zip(names, here, strict=True)])

@@ -1,5 +1,6 @@
 """Strides of the actuators, none beyond what is safe under all likely loads."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -64,3 +65,8 @@ class Strides:
         if not borne.safe.any():
             return None
         return borne.estimated[int(np.argmax(np.where(borne.safe, borne.margins, -np.inf)))]
+
+
+def setting_of(point: Mapping[str, float], names: tuple[str, ...], here: Values) -> Values:
+    """A way-point as an array; actuators that it does not name stay."""
+    return np.array([point.get(name, value) for name, value in zip(names, here, strict=True)])

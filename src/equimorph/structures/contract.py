@@ -311,6 +311,11 @@ class Structure(Equations):
         return np.zeros(len(z))
 
     @property
+    def is_discretised(self) -> bool:
+        """Whether a finer discretisation resolves more; elsewhere `resolved` only bounds states."""
+        return type(self).error_estimate is not Structure.error_estimate
+
+    @property
     def watched(self) -> tuple[Descriptor, ...]:
         """Descriptors whose zeros are events on the lift of one state; see `Vanishing`."""
         return ()

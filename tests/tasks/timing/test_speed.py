@@ -104,12 +104,10 @@ def test_near_a_fold_the_limit_slows_down_and_then_refuses(route):
     slow, fast = (em.speed_limit(each, 0.02) for each in (near, far))
     assert slow.rate < 0.5 * fast.rate
     assert slow.frequencies[-1] < 0.2 * slow.frequencies[0]
-    edge = replace(near, values=near.values.copy())
-    edge.values[-1, 1] = 0.4181360
+    beyond = near.values.copy()
+    beyond[-2:] = [[1.0, 0.4181360, 2.5, np.sin(1.0)], [1.0, 0.5, 2.5, np.sin(1.0)]]
     with pytest.raises(InputError, match=r"`schedule` must (stay away from folds|be safe at rest)"):
-        em.speed_limit(
-            replace(edge, values=np.append(edge.values, [[1.0, 0.5, 2.5, np.sin(1.0)]], 0)), 0.02
-        )
+        em.speed_limit(replace(near, values=beyond), 0.02)
     bare = em.Rod(EI=1.0, length=1.0).natural_state(Theta=1.0)
     with pytest.raises(InputError, match="must have a mass"):
         em.speed_limit(em.verify([{"Delta": 0.1}], bare).schedule, 0.02)

@@ -123,10 +123,8 @@ def retime(
     inner = times / stretch
     values = motion.at(inner)
     values[0], values[-1] = begin.p, corners[-1]
-    done = verify(
-        replace(schedule, values=values, times=None, velocities=None, accelerations=None),
-        begin, structure=structure, within=within, margin=margin,
-    )  # fmt: skip
+    rows = [dict(zip(schedule.names, row.tolist(), strict=True)) for row in values[1:]]
+    done = verify(rows, begin, structure=structure, within=within, margin=margin)
     if done.schedule is None:
         return done
     met = np.interp(number, np.arange(len(corners)), motion.corner_times)
