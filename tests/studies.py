@@ -11,7 +11,7 @@ from PIL import Image
 
 from equimorph import plotting
 from equimorph.errors import InputError
-from equimorph.study import Outcome, parse_study, prepare, run_study
+from equimorph.study import Outcome, parse_study, prepare, report, run_study
 from equimorph.study.folder import PRIVATE
 from equimorph.tasks.route import Route
 from typecheck import unchecked
@@ -98,6 +98,7 @@ def answered(folder: Path, text: str, *, dots: bool = True) -> tuple[Outcome, Pa
     if text.startswith(SPRING_SET) and _SETS:
         with_answers_of(_SETS[0], out)
     with pytest.MonkeyPatch.context() as patch, unchecked():
+        empty_pages(patch)
         if dots:
             draw_dots(patch)
         outcome = run_study(study, out)
@@ -147,11 +148,17 @@ def with_answers_of(finished: Path, out: Path) -> Path:
 
 
 def draw_dots(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Put dots in place of figures, which take seconds and are tested once, where all are drawn."""
+    """Put dots in place of figures and pages, which take seconds; `finished_run` draws them."""
     for name in ("surface", "parameter_plane", "shapes", "margins"):
         monkeypatch.setattr(plotting, name, lambda *_, **__: None)
     monkeypatch.setattr(plotting, "save", lambda _, folder, name: _dot(folder / f"{name}.png"))
     monkeypatch.setattr(plotting, "film", lambda _, path, **__: _dot(path))
+    empty_pages(monkeypatch)
+
+
+def empty_pages(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Put an empty page in place of the explorer's."""
+    monkeypatch.setattr(report, "explore", lambda *given, **_: given[2].write_text("<html></html>"))
 
 
 def _dot(path: Path) -> None:

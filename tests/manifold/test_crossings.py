@@ -172,6 +172,7 @@ def test_constraint_cuts_both_sheets_where_they_cross():
     assert sorted(eset.points["b"][ends]) == pytest.approx([-1.0, 0.3])
 
 
+@pytest.mark.slow
 def test_three_sheets_that_meet_in_one_point_are_not_called_clean():
     """x (x − a) (x − b): three crossings meet at the origin, which this complex cannot hold."""
     eset = lifted(three_planes(), BOX, intervals=(2, 3))

@@ -109,6 +109,7 @@ def _kill(trial: Trial, count: int, folder: Path, seed: int) -> Counter[str]:
     return stages
 
 
+@pytest.mark.slow
 def test_some_kills_at_random_times_change_nothing(dotted: Trial, tmp_path: Path):
     _kill(dotted, 4, tmp_path, seed=0)
 
@@ -147,6 +148,7 @@ def test_death_at_operations_on_files_changes_nothing(dotted: Trial, tmp_path: P
     assert at > 100
 
 
+@pytest.mark.slow
 def test_other_signals_change_nothing(dotted: Trial, tmp_path: Path):
     ends = [(0.2, signal.SIGINT), (0.3, signal.SIGTERM)]
     timed = [{"after": share * dotted.seconds, "by": by} for share, by in ends]

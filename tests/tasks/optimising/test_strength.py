@@ -45,6 +45,7 @@ def test_the_uniform_arch_is_strongest_on_its_ridge(uniform):
     assert fall[1:] / fall[:-1] == pytest.approx(0.1 ** (2 / 3), rel=0.05)
 
 
+@pytest.mark.slow
 def test_an_optimum_where_the_map_ends_is_found():
     """A round arch that must not leave its plane is strongest where κ = 10 without load, Δ = 0.
 
