@@ -135,15 +135,19 @@ def cap_ahead(rods, limit):
 AHEAD = {"fold": fold_ahead, "branch point": branch_point_ahead, "constraint": cap_ahead}
 
 
-def compare(number, generator):
-    """Errors of one random setting, and how its path ends."""
+def draw(number, generator):
+    """A rod at rest, and its load as the oracle takes it."""
     load, oracle = LOADS[number % len(LOADS)](generator)
     rod = em.Rod(load)
     while True:
         Theta, Delta = generator.uniform((0.3, -1.2), (2.0, 1.2))
         rest = rod.natural_state(Theta=Theta, Delta=0.0 if number % 20 == 0 else Delta)
         if rod.max_curvature(rest) < CAP:
-            break
+            return rod, rest, oracle
+
+
+def compare(rod, rest, oracle):
+    """Errors of one random setting, and how its path ends."""
     limit = em.limit_load(rest, "q", within=[rod.max_curvature <= CAP])
     start = shooting.from_package(rest, oracle).solved()
     rods = followed(start, limit.value)
@@ -157,10 +161,11 @@ def compare(number, generator):
     return limit.kind, Errors(abs(limit.value - exact.q), max(heights), curvature)
 
 
-def check(settings, seed):
+def check(settings, seed, first=0):
     generator, kinds = np.random.default_rng(seed), set()
-    for number in range(settings):
-        kind, errors = compare(number, generator)
+    drawn = [draw(number, generator) for number in range(first + settings)]
+    for number, setting in enumerate(drawn[first:], first):
+        kind, errors = compare(*setting)
         kinds.add(kind)
         assert max(errors.limit, errors.height, errors.curvature) < 1e-8, (number, kind, errors)
     return kinds
@@ -172,6 +177,8 @@ def test_limit_loads_heights_and_curvature_are_exact_to_1e_8():
 
 
 @pytest.mark.slow
-def test_limit_loads_heights_and_curvature_are_exact_to_1e_8_in_a_hundred_settings():
+@pytest.mark.parametrize("first", [0, 25, 50, 75])
+def test_limit_loads_heights_and_curvature_are_exact_to_1e_8_in_a_hundred_settings(first):
     """Issue 3. Errors of 1e-12 are usual: loading paths from the natural state bend little."""
-    assert check(100, seed=12) == {"fold", "constraint", "branch point"}
+    ends = {"fold", "constraint", "branch point"}
+    assert check(25, 12, first) == (ends - {"branch point"} if first == 25 else ends)

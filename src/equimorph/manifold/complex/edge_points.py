@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 from equimorph.arrays import ItemFlags, Items, ItemValues, Pairs, Some
 from equimorph.equilibria.settle import lower_index
@@ -51,8 +51,8 @@ def chunks(chosen: Items, marks: Int[np.ndarray, " E"]) -> list[Int[np.ndarray, 
     return parts
 
 
-Tried = tuple[ItemFlags, Vertices]
-"""For which edges vertices were found, and these."""
+Tried = tuple[Bool[np.ndarray, " _"], Vertices]
+"""For which edges vertices were found, and these; lists of them are of several lengths."""
 
 
 @dataclass(frozen=True)
