@@ -36,8 +36,12 @@ bench: $(INSTALLED)
 	$(BIN)/python -m pytest -o addopts="--import-mode=importlib" -p no:xdist --benchmark-only benchmarks
 
 # The program of the explorer's page, for whoever changes it: needs node, which nothing else does.
-explorer:
-	cd explorer && npm ci --no-fund --no-audit && npx tsc && node build.mjs
+explorer: explorer/node_modules
+	cd explorer && npx tsc && node build.mjs
+
+explorer/node_modules: explorer/package-lock.json
+	cd explorer && npm ci --no-fund --no-audit
+	touch $@
 
 clean:
 	rm -rf .venv .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis .benchmarks \

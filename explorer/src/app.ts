@@ -1,17 +1,19 @@
 /** The page: what is pinned, what is pointed at, and how clicks, drags and keys change that. */
 
-import { INDEX_COLOURS, indexColour, indexName, PINS, ROUTE_COLOUR, scaleGradient } from "./colours";
+import { Appearance } from "./appearance";
+import { indexName, PINS, ROUTE_COLOUR } from "./colours";
+import { helpDialog, legend } from "./legend";
 import type { End, EquilibriumSet, Landing, Spot } from "./set";
+import { overlays } from "./overlays";
 import { closest, equilibriaList, numbersTable, type Column } from "./panels";
 import { Player } from "./player";
 import { ShapePanel, type Portrait } from "./shape";
-import { View, type Mark, type Theme } from "./view";
+import { View, type Mark } from "./view";
 import { Way } from "./way";
-import { h, label, number } from "./words";
+import { h, label, number, plain } from "./words";
 
 const LETTERS = "ABCDEF";
-const NEAR = 18;
-const CLICK = 5;
+const NEAR = 18, CLICK = 5;
 const ENDS: Record<End, string> = {
   arrived: "", fold: "Stopped at a fold: stability ends here.", "branch point": "Stopped at a branch point.", box: "Stopped at the edge of the box.",
   constraint: "Stopped at a constraint.", unresolved: "Stopped: the cells are too steep here.",
@@ -39,10 +41,10 @@ export class App {
   private sliceText = h("output");
   private above = false;
   private linkTimer = 0;
+  private readonly appearance = new Appearance(() => this.view.setTheme(this.appearance.colours));
 
   constructor(readonly set: EquilibriumSet) {
-    this.theme();
-    this.view = new View(set, this.colours());
+    this.view = new View(set, this.appearance.colours);
     this.shape = new ShapePanel(set);
     this.player = new Player(set);
     this.player.onMove = () => this.refresh();
@@ -61,7 +63,7 @@ export class App {
     const { words } = this.set;
     const box = words.parameters.map((p) => `${p.name} ∈ [${number(p.lower)}, ${number(p.upper)}]${p.unit && p.unit !== "1" ? ` ${p.unit}` : ""}`);
     const lead = [words.kind, ...box, ...words.constraints.map((each) => each.replace("<=", "≤").replace(">=", "≥"))].join(" · ");
-    const scalars = words.scalars.map((each, k) => h("option", { value: k }, label(each.name === "stability_margin" ? "stability margin" : each.name, each.unit)));
+    const scalars = words.scalars.map((each, k) => h("option", { value: k }, label(plain(each.name), each.unit)));
     this.heightChoice = h("select", { change: () => this.setHeight(Number(this.heightChoice.value)) }, ...scalars.map((each) => each.cloneNode(true)));
     this.heightChoice.value = String(this.view.height);
     this.colourChoice = h("select", { change: () => this.setColour(Number(this.colourChoice.value)) }, h("option", { value: -1 }, "index"), ...(this.set.d === 1 ? [] : scalars));
@@ -69,10 +71,10 @@ export class App {
     if (this.set.d > 1) tools.append(h("button", { type: "button", click: () => this.lookAbove(!this.above) }, "From above / side"));
     if (this.set.d === 3) tools.append(this.slicer());
     const viewBox = h("div", { class: "view-box", tabindex: 0, role: "application", "aria-roledescription": "equilibrium set", "aria-label": `Equilibrium set over ${words.parameters.map((p) => p.name).join(" and ")}. Arrow keys walk on the sheet; question mark lists all keys.` }, this.view.element);
-    const help = this.help();
+    const help = helpDialog();
     this.root.append(
       h("header", {}, h("div", {}, h("h1", {}, words.title), h("p", { class: "lead" }, lead)),
-        h("div", { class: "row" }, h("button", { type: "button", click: () => this.switchTheme() }, "Light / dark"), h("button", { type: "button", "aria-haspopup": "dialog", click: () => help.showModal() }, "Help"))),
+        h("div", { class: "row" }, h("button", { type: "button", click: () => this.switchAppearance() }, "Light / dark"), h("button", { type: "button", "aria-haspopup": "dialog", click: () => help.showModal() }, "Help"))),
       ...(words.clean ? [] : [h("p", { class: "verdict" }, `The audit of this set is not clean: ${words.audit}.`)]),
       h("div", { class: "stage" },
         h("section", { class: "left", "aria-label": "Set" }, tools, viewBox, this.legend),
@@ -101,42 +103,13 @@ export class App {
     return form;
   }
 
-  private help(): HTMLDialogElement {
-    const keys: [string, string][] = [
-      ["← → ↑ ↓", "walk on the sheet in the first and second parameter, over stable cells only"], ["Page ↑ ↓", "the same in the third parameter"], ["Shift + arrows", "turn the set"], ["+ −", "nearer, farther"],
-      ["N", "next equilibrium over the same parameters"], ["S", "follow the snap from a fold to where it lands"], ["Enter", "pin the present state once more, to compare"], ["Delete", "remove the pin"],
-      ["W", "begin a way here, or lead it to the present state"], ["Space", "play or pause the route"], ["V", "from above or from the side"],
-    ];
-    const dialog = h("dialog", { "aria-label": "Help" }, h("h2", {}, "Help"),
-      h("p", {}, "Point at the set to see the shape of a state; click to pin it. Drag the ring of the present pin: it walks on the sheet and stops where stability ends. Drag anything else to turn the set."),
-      h("dl", {}, ...keys.flatMap(([key, what]) => [h("dt", {}, h("kbd", {}, key)), h("dd", {}, what)])),
-      h("button", { type: "button", click: () => dialog.close() }, "Close"));
-    return dialog;
-  }
-
-  private drawLegend(): void {
-    const { set, view } = this, present = [...new Set(set.cellIndex)].sort((a, b) => a - b).filter((each) => each <= INDEX_COLOURS.length);
-    const item = (swatch: HTMLElement, text: string) => h("span", { class: "entry" }, swatch, text);
-    const entries: HTMLElement[] = [];
-    if (view.colour < 0) for (const index of present) entries.push(item(h("span", { class: `swatch hatch${Math.min(3, index)}${set.d === 1 && index ? " dashed" : ""}`, style: `--index: ${indexColour(index)}` }), indexName(index)));
-    else {
-      const [low, high] = view.colourRange(), { name, unit } = set.words.scalars[view.colour];
-      entries.push(h("span", { class: "entry scale" }, number(low, 3), h("span", { class: "bar", style: `background: ${scaleGradient()}` }), `${number(high, 3)} ${label(name === "stability_margin" ? "stability margin" : name, unit)}; hatched: unstable`));
-    }
-    const lines: [boolean, string, string][] = [
-      [view.sheet.lines.stability.length > 0 && set.d > 1, "stability", "edge of stability"], [view.sheet.lines.fold.length > 0 && set.d > 1, "fold", "other folds"],
-      [view.sheet.lines.crossing.length > 0, "crossing", "branch points"], [view.sheet.lines.constraint.length > 0, "constraint", "constraint"],
-      [set.words.routes.some((each) => each.count), "route", "route"], [set.words.barriers.length > 0, "barrier", `barriers${set.words.rule ? ` (${set.words.rule})` : ""}`],
-    ];
-    for (const [is, kind, text] of lines) if (is) entries.push(item(h("span", { class: `stroke ${kind}` }), text));
-    this.legend.replaceChildren(...entries);
-  }
+  private drawLegend(): void { this.legend.replaceChildren(...legend(this.set, this.view)); }
 
   // --- changes ----------------------------------------------------------------------------------
 
   setHeight(scalar: number): void { this.view.height = scalar; this.heightChoice.value = String(scalar); this.view.rebuild(); this.drawOverlays(); this.refresh(); }
   setColour(scalar: number): void { this.view.colour = scalar; this.colourChoice.value = String(scalar); this.view.rebuild(); this.drawLegend(); this.refresh(); }
-  lookAbove(above: boolean): void { this.above = above; this.view.look(above); }
+  lookAbove(above: boolean): void { this.above = above; this.view.eye.look(above); }
 
   setLevel(level: number): void {
     const { lower, upper } = this.set.words.parameters[2];
@@ -266,24 +239,7 @@ export class App {
     link.click();
   }
 
-  private drawOverlays(): void {
-    const { set } = this, lines: Parameters<View["setOverlays"]>[0] = [];
-    for (const route of set.words.routes) {
-      const jumps = new Set(route.snaps), solid: (Spot | null)[] = [], leaps: (Spot | null)[] = [];
-      for (let k = 0; k < route.count; k++) {
-        solid.push(set.atState(route.first + k));
-        if (jumps.has(k)) { solid.push(null); leaps.push(set.atState(route.first + k), set.atState(route.first + k + 1), null); }
-      }
-      lines.push({ spots: solid, width: 3.4 }, { spots: leaps, width: 2, dash: 0.03 });
-    }
-    for (const { near, far, count, facets } of set.words.barriers)
-      for (const first of [near, far]) {
-        const pairs = set.d === 3 ? facets.flatMap((f) => [f[0], f[1], null, f[1], f[2], null]) : [...Array(count).keys()];
-        lines.push({ spots: pairs.map((k) => (k === null ? null : set.atState(first + k))), width: 2.2, colour: "#7b3fa0", dash: first === near ? 0 : 0.02 });
-      }
-    for (const leg of this.way?.legs ?? []) lines.push({ spots: leg.track, width: 3, colour: leg.end === "arrived" ? "#0b7a75" : "#b3261e", dash: 0.02 });
-    this.view.setOverlays(lines);
-  }
+  private drawOverlays(): void { this.view.setOverlays(overlays(this.set, this.way)); }
 
   // --- what is shown ----------------------------------------------------------------------------
 
@@ -309,13 +265,12 @@ export class App {
     this.view.setMarks(marks);
     this.shape.show(portraits);
     this.numbers.replaceChildren(numbersTable(this.set, columns, (k) => this.unpin(k)));
-    if (this.spot && !this.hover) this.list.replaceChildren(equilibriaList(this.set, this.spot, this.view.height, (spot) => this.stand(spot, "arrived", null)), ...this.snapButton());
+    if (this.spot && !this.hover) {
+      const snap = this.landing?.spot ? [h("button", { type: "button", click: () => this.followSnap() }, "Follow the snap")] : [];
+      this.list.replaceChildren(equilibriaList(this.set, this.spot, this.view.height, (spot) => this.stand(spot, "arrived", null)), ...snap);
+    }
     if (!this.hover) this.tell(this.describe());
     this.link();
-  }
-
-  private snapButton(): HTMLElement[] {
-    return this.landing?.spot ? [h("button", { type: "button", click: () => this.followSnap() }, "Follow the snap")] : [];
   }
 
   private describe(): string {
@@ -339,16 +294,16 @@ export class App {
     box.addEventListener("pointerdown", (e) => {
       down = last = at(e);
       moved = false;
-      const spot = this.spot, here = spot && this.view.project(this.view.position(spot));
+      const spot = this.spot, here = spot && this.view.eye.project(this.view.position(spot));
       walking = !!here && Math.hypot(here[0] - down[0], here[1] - down[1]) < NEAR;
-      this.view.controls.enabled = !walking;
+      this.view.eye.controls.enabled = !walking;
       if (walking) box.setPointerCapture(e.pointerId);
     }, true);
     box.addEventListener("pointermove", (e) => {
       const now = at(e);
       if (down && Math.hypot(now[0] - down[0], now[1] - down[1]) > CLICK) moved = true;
       if (walking && moved && this.spot) {
-        const here = this.view.project(this.view.position(this.spot)), step = this.view.stepFor(this.spot, now[0] - here[0], now[1] - here[1]);
+        const here = this.view.eye.project(this.view.position(this.spot)), step = this.view.stepFor(this.spot, now[0] - here[0], now[1] - here[1]);
         this.walkTo(this.set.parameters(this.spot).map((x, a) => x + step[a]));
       } else if (!down && e.pointerType !== "touch") {
         last = now;
@@ -359,14 +314,13 @@ export class App {
       if (down && !moved) this.click(this.view.pick(...at(e)), walking);
       down = null;
       walking = false;
-      this.view.controls.enabled = true;
+      this.view.eye.controls.enabled = true;
     };
     box.addEventListener("pointerup", up);
-    box.addEventListener("pointercancel", () => { down = null; walking = false; this.view.controls.enabled = true; });
+    box.addEventListener("pointercancel", () => { down = null; walking = false; this.view.eye.controls.enabled = true; });
     box.addEventListener("pointerleave", () => { if (!down) this.pointAt(null); });
     box.addEventListener("keydown", (e) => { if (e.target === box && this.key(e)) e.preventDefault(); });
     window.addEventListener("hashchange", () => { this.readLink(); this.refresh(); });
-    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { this.theme(); this.view.setTheme(this.colours()); });
   }
 
   private pointAt(spot: Spot | null): void {
@@ -387,11 +341,11 @@ export class App {
     const arrows: Record<string, [number, number]> = { ArrowLeft: [0, -1], ArrowRight: [0, 1], ArrowDown: [1, -1], ArrowUp: [1, 1], PageDown: [2, -1], PageUp: [2, 1] };
     const arrow = arrows[e.key];
     if (e.ctrlKey || e.metaKey) return false;
-    if (arrow && e.shiftKey) this.view.turn(arrow[0] === 0 ? -0.1 * arrow[1] : 0, arrow[0] === 1 ? 0.1 * arrow[1] : 0);
+    if (arrow && e.shiftKey) this.view.eye.turn(arrow[0] === 0 ? -0.1 * arrow[1] : 0, arrow[0] === 1 ? 0.1 * arrow[1] : 0);
     else if (arrow) this.step(arrow[0], arrow[1], e.altKey ? 0.001 : 0.01);
     else {
       const actions: Record<string, () => void> = {
-        "+": () => this.view.zoom(1.15), "=": () => this.view.zoom(1.15), "-": () => this.view.zoom(1 / 1.15), n: () => this.next(), s: () => this.followSnap(),
+        "+": () => this.view.eye.zoom(1.15), "=": () => this.view.eye.zoom(1.15), "-": () => this.view.eye.zoom(1 / 1.15), n: () => this.next(), s: () => this.followSnap(),
         Enter: () => { if (this.spot) this.pin(this.spot); }, Delete: () => { if (this.current >= 0) this.unpin(this.current); }, " ": () => this.player.toggle(),
         w: () => { if (!this.way) this.beginWay(); else if (this.spot) this.leadWay(this.set.parameters(this.spot)); },
         v: () => this.lookAbove(!this.above), "?": () => this.root.querySelector("dialog")!.showModal(),
@@ -403,26 +357,9 @@ export class App {
     return true;
   }
 
-  // --- theme and links --------------------------------------------------------------------------
+  // --- appearance and links ---------------------------------------------------------------------
 
-  private theme(): void {
-    const chosen = new URLSearchParams(location.hash.slice(1)).get("theme");
-    const dark = chosen ? chosen === "dark" : matchMedia("(prefers-color-scheme: dark)").matches;
-    document.documentElement.dataset.theme = dark ? "dark" : "light";
-  }
-
-  private colours(): Theme {
-    return document.documentElement.dataset.theme === "dark" ? { ink: "#f0f0f0", faint: "#8c8c8c", paper: "#17191c" } : { ink: "#1a1a1a", faint: "#8c8c8c", paper: "#ffffff" };
-  }
-
-  private switchTheme(): void {
-    const root = document.documentElement.dataset;
-    root.theme = root.theme === "dark" ? "light" : "dark";
-    this.themeChosen = root.theme;
-    this.view.setTheme(this.colours());
-    this.link();
-  }
-  private themeChosen = new URLSearchParams(location.hash.slice(1)).get("theme") ?? "";
+  private switchAppearance(): void { this.appearance.change(); this.view.setTheme(this.appearance.colours); this.link(); }
 
   /** A state in the address: parameters, and its place among the equilibria over them. */
   private stateText(spot: Spot): string {
@@ -438,7 +375,7 @@ export class App {
     if (view.level !== null) link.set("slice", String(Number(view.level.toPrecision(6))));
     if (this.player.at > 0) link.set("route", `${this.set.words.routes.indexOf(this.player.route!)},${this.player.at.toFixed(3)}`);
     link.set("camera", view.cameraText);
-    if (this.themeChosen) link.set("theme", this.themeChosen);
+    if (this.appearance.chosen) link.set("theme", this.appearance.chosen);
     return link.toString();
   }
 

@@ -2,7 +2,7 @@
 
 import { indexColour, indexName } from "./colours";
 import type { EquilibriumSet, Spot } from "./set";
-import { h, label, number } from "./words";
+import { h, label, number, plain } from "./words";
 
 export interface Column { name: string; colour: string; spot: Spot; exact: boolean }
 
@@ -16,7 +16,7 @@ export function numbersTable(set: EquilibriumSet, columns: Column[], remove: (co
   for (const { name, unit, value } of set.words.fixed) row(name, unit, columns.map(() => number(value)));
   row("index", "", columns.map(({ spot }) => { const index = set.indexOf(spot); return index === 0 ? "0, stable" : `${index}, unstable`; }));
   set.words.scalars.forEach(({ name, symbol, unit }, k) => {
-    const words = name === "stability_margin" ? "stability margin" : name === "lateral_margin" ? "lateral margin" : name;
+    const words = plain(name);
     row(words === symbol || name === words ? words : symbol, unit, columns.map(({ spot }) => number(set.scalar(k, spot))));
   });
   row("source", "", columns.map(({ exact }) => (exact ? "computed" : "interpolated")));

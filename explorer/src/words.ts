@@ -12,6 +12,9 @@ export function number(value: number, digits = 4): string {
 export function withUnit(text: string, unit: string): string { return unit && unit !== "1" ? `${text} ${unit}` : text; }
 export function label(name: string, unit: string): string { return unit && unit !== "1" ? `${name} (${unit})` : name; }
 
+/** The name of a scalar in words. */
+export function plain(name: string): string { return name.replace(/_margin$/, " margin"); }
+
 /** Round values between two numbers, about `wanted` of them. */
 export function ticks(low: number, high: number, wanted = 5): number[] {
   if (!(high > low)) return [low];

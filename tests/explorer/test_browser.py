@@ -16,7 +16,7 @@ index: set.indexOf(spot), angle: set.scalar(set.named('angle'), spot)}; })()"""
 LANDING = """(() => { const {set, landing} = explorer; return {released: landing.released,
 angle: set.scalar(set.named('angle'), landing.spot)}; })()"""
 TOWARDS = """(() => { const {set, view, spot} = explorer;
-return view.project(view.position(set.walk(spot, [0.8, 0.05]).spot)); })()"""
+return view.eye.project(view.position(set.walk(spot, [0.8, 0.05]).spot)); })()"""
 """Pixels of the state to which the load is a little larger."""
 NAMELESS = """() => [...document.querySelectorAll(
 'button, select, input, [role=application], svg[role=img]')].filter((e) =>
@@ -93,7 +93,7 @@ def test_a_drag_stops_at_the_fold_and_shows_the_landing(spring):
     page(UPPER)
     page("explorer.view.draw()")
     start = page(STATE)
-    x, y = page("explorer.view.project(explorer.view.position(explorer.spot))")
+    x, y = page("explorer.view.eye.project(explorer.view.position(explorer.spot))")
     box = page.page.locator(".view").bounding_box()
     towards = page(TOWARDS)
     mouse = page.page.mouse
@@ -173,7 +173,7 @@ def test_a_state_in_the_address_comes_back(opened, spring_page, spring):
     spring("explorer.goToPoint([0.8, 0.05])")
     spring("explorer.setColour(explorer.set.named('energy'))")
     spring("explorer.player.move(0.25)")
-    spring("explorer.switchTheme()")
+    spring("explorer.switchAppearance()")
     fragment = spring("'#' + explorer.linkText")
     again = opened(spring_page, fragment)
     assert again(STATE)["p"] == pytest.approx(spring(STATE)["p"], abs=1e-6)
@@ -251,7 +251,7 @@ def test_a_tap_pins_a_state(opened, spring_page):
     page("explorer.lookAbove(true)")
     page("explorer.view.draw()")
     before = page("explorer.pins.length")
-    x, y = page("explorer.view.project(explorer.view.position(explorer.set.over([1.2, 0.1])[0]))")
+    x, y = page("explorer.view.eye.project(explorer.view.position(explorer.set.over([1.2, 0.1])[0]))")
     page.page.touchscreen.tap(box["x"] + x, box["y"] + y)
     assert page("explorer.pins.length") == before + 1
     assert page(STATE)["p"] == pytest.approx([1.2, 0.1], abs=0.02)

@@ -42,7 +42,7 @@ class Plant:
         path = em.lift(self.state, there)
         if not path.arrived:
             self.snapped = True
-            landings = [each for each in em.snap_landing(path.end.state) if each.state is not None]
+            landings = [each for each in em.snap_landing(path.end.state) if each.landed]
             path = em.lift(landings[0].state, there)
         self.state = path.end.state
         self.least = min(self.least, self.state.margin)

@@ -16,7 +16,7 @@ from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.geometry.topology import Adjacency, adjacency, faces_of
 from equimorph.manifold.lookup.exact_states import exact_states, root_weights
-from equimorph.structures import State, States
+from equimorph.structures import State, States, join_states
 
 AT_VERTEX = 1e-6
 """Share of an edge within which a way that crosses it runs through its end."""
@@ -97,9 +97,7 @@ def _coords(eset: EquilibriumSet, states: States) -> Float[np.ndarray, "points d
 
 
 def _chain(eset: EquilibriumSet, start: State, middle: States | None, goal: State) -> States:
-    parts = [start.batch, *([] if middle is None else [middle]), goal.batch]
-    z, p = (np.concatenate([getattr(part, name) for part in parts]) for name in ("z", "p"))
-    return States(eset.structure, z, p)
+    return join_states(eset.structure, [start, *([] if middle is None else [middle]), goal])
 
 
 def _over_edges(eset: EquilibriumSet, start: Place, goal: Place) -> list[int] | None:

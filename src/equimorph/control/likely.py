@@ -9,7 +9,7 @@ from jaxtyping import Float, Int
 from equimorph.arrays import Flags, Parameters, Some, Values
 from equimorph.equilibria.soft_modes import metric_length
 from equimorph.model import position
-from equimorph.structures import States, Structure
+from equimorph.structures import States, Structure, join_states
 from equimorph.tasks.planning.network import MATCH, Demands, lift_straight
 
 Loads = Float[np.ndarray, " k"]
@@ -63,10 +63,8 @@ class Bundles:
 
     def follow(self, other: "Bundles") -> "Bundles":
         """These places, then others."""
-        z, p = (np.concatenate([getattr(each.states, name) for each in (self, other)])
-            for name in "zp")  # fmt: skip
-        safe = np.concatenate([self.safe, other.safe])
-        return Bundles(States(self.states.structure, z, p), safe, self.loads)
+        states = join_states(self.states.structure, [self.states, other.states])
+        return Bundles(states, np.concatenate([self.safe, other.safe]), self.loads)
 
 
 @dataclass(frozen=True)
@@ -103,7 +101,7 @@ class LikelyLoads:
     def under(self, states: States) -> Bundles:
         """States under each of the loads, lifted from where they are."""
         count = len(self.values)
-        source = States(states.structure, states.z.repeat(count, 0), states.p.repeat(count, 0))
+        source = states[np.arange(len(states)).repeat(count)]
         to = source.p.copy()
         to[:, self.at] = np.tile(self.values, (len(states), 1))
         return self._bundles(source, to)

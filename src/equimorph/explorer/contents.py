@@ -12,7 +12,6 @@ import numpy as np
 from jaxtyping import Int, Num
 
 from equimorph.charts import Reduction
-from equimorph.equilibria import Landing
 from equimorph.errors import InputError
 from equimorph.explorer.packing import quantise
 from equimorph.explorer.pictures import gallery
@@ -21,7 +20,7 @@ from equimorph.manifold import EquilibriumSet, SnapGraph
 from equimorph.model import Constraint, Descriptor, Disc, Obstacle
 from equimorph.plotting.curves import corner_steps, snap_steps
 from equimorph.plotting.support_symbols import AWAY, SYMBOLS, UPRIGHT
-from equimorph.structures import States, effort_of, margin_of
+from equimorph.structures import States, effort_of, join_states, margin_of
 from equimorph.tasks.route import Route
 
 _ROUTE_STATES = 400
@@ -121,8 +120,7 @@ class _States:
 
     def all(self) -> States:
         """Every state, in order."""
-        z, p = (np.concatenate([getattr(each, k) for each in self._parts]) for k in "zp")
-        return States(self._parts[0].structure, z, p)
+        return join_states(self._parts[0].structure, self._parts)
 
 
 def _index(eset: EquilibriumSet, states: States) -> Int[np.ndarray, " lanes"]:
@@ -179,8 +177,6 @@ def _scalars(
         values = np.concatenate(
             [each(states[k : k + _AT_ONCE]) for k in range(0, len(states), _AT_ONCE)]
         )
-        if each.name == "energy":
-            values = states.energy
         packed, low, step = quantise(values)
         exact = each.name in _EXACT
         arrays[f"scalar{number}"] = np.nan_to_num(values).astype(np.float32) if exact else packed
@@ -236,8 +232,8 @@ def _snaps(graph: SnapGraph, extra: _States) -> tuple[list[dict[str, Any]], Arra
         runs.append({"source": snap.source, "target": snap.target, "status": snap.status})
         along.append(snap.along)
         run_along.append(np.full(len(snap.along), number))
-        landed = [each for each in snap.landings if each.landed]
-        first = extra.add(_ends(landed, graph.eset.points)) if landed else 0
+        landed = [each.state for each in snap.landings if each.landed]
+        first = extra.add(join_states(graph.eset.structure, landed))
         for where, each in zip(snap.vertices.tolist(), snap.landings, strict=True):
             vertex.append(where)
             run.append(number)
@@ -251,11 +247,6 @@ def _snaps(graph: SnapGraph, extra: _States) -> tuple[list[dict[str, Any]], Arra
     }  # fmt: skip
     arrays: Arrays = {name: np.asarray(each, dtype=np.int32) for name, each in whole.items()}
     return runs, arrays | {"snap_released": np.asarray(released, dtype=np.float32)}
-
-
-def _ends(landings: Sequence[Landing], like: States) -> States:
-    z, p = (np.stack([getattr(each.state, k) for each in landings]) for k in "zp")
-    return States(like.structure, z, p)
 
 
 def _barriers(reduction: Reduction, extra: _States) -> list[dict[str, Any]]:

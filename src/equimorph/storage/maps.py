@@ -12,7 +12,7 @@ from equimorph.model import Grid
 from equimorph.storage.files import number_text, write_csv
 from equimorph.storage.hdf import get, get_json, put, put_coordinate, put_json
 from equimorph.storage.owner import Owner, words_of
-from equimorph.structures import States, Structure
+from equimorph.structures import States, Structure, join_states
 from equimorph.tasks.maps.actuator_map import ActuatorMap, natural_states_over
 from equimorph.tasks.maps.curvature import CurvatureMap
 from equimorph.tasks.maps.curves import MapCurve
@@ -53,11 +53,9 @@ def write_map_group(group: h5py.Group, amap: ActuatorMap) -> None:
     )
     errors = np.concatenate([np.zeros(0), *(c.errors for c in curves)])
     put(group, "curve_error", errors, ["point"], "bound of the error along the grid line")
-    sizes = amap.states.z.shape[1], amap.states.p.shape[1]
-    for name, size in zip("zp", sizes, strict=True):
-        states = [getattr(c.states, name) for c in curves]
-        array = np.concatenate([np.zeros((0, size)), *states])
-        put(group, f"curve_{name}", array, ["point", {"z": "unknown", "p": "parameter"}[name]])
+    states = join_states(amap.structure, [each.states for each in curves])
+    put(group, "curve_z", states.z, ["point", "unknown"])
+    put(group, "curve_p", states.p, ["point", "parameter"])
     put_json(group, ABOUT, _about(amap))
 
 
