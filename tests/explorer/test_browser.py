@@ -251,7 +251,9 @@ def test_a_tap_pins_a_state(opened, spring_page):
     page("explorer.lookAbove(true)")
     page("explorer.view.draw()")
     before = page("explorer.pins.length")
-    x, y = page("explorer.view.eye.project(explorer.view.position(explorer.set.over([1.2, 0.1])[0]))")
+    x, y = page(
+        "explorer.view.eye.project(explorer.view.position(explorer.set.over([1.2, 0.1])[0]))"
+    )
     page.page.touchscreen.tap(box["x"] + x, box["y"] + y)
     assert page("explorer.pins.length") == before + 1
     assert page(STATE)["p"] == pytest.approx([1.2, 0.1], abs=0.02)
