@@ -106,6 +106,15 @@ from .equilibria import (
     Landing as Landing,
 )
 
+# Energy barriers and transitions
+from .equilibria import (
+    transition_network as transition_network,
+    TransitionNetwork as TransitionNetwork,
+    EnergyBarrier as EnergyBarrier,
+    EnergyPath as EnergyPath,
+    Merge as Merge,
+)
+
 # Follow critical states
 from .equilibria import (
     fold_curve as fold_curve,

@@ -9,6 +9,7 @@ from equimorph.equilibria.critical_curves import (
     grazing_curve,
 )
 from equimorph.equilibria.curves import ParameterLine
+from equimorph.equilibria.energy_barriers import EnergyBarrier, EnergyPath, Merge
 from equimorph.equilibria.legs import Leg, Waypoint
 from equimorph.equilibria.lift import Event, Lifts, Path, check_start, lift, way_points
 from equimorph.equilibria.limit_load import LimitLoad, LimitLoads, limit_load
@@ -20,6 +21,7 @@ from equimorph.equilibria.snap import Landing, snap_landing
 from equimorph.equilibria.switching import Branch, branches
 from equimorph.equilibria.trace import Traces, trace
 from equimorph.equilibria.trace_options import EventKind, TraceOptions
+from equimorph.equilibria.transitions import TransitionNetwork, transition_network
 from equimorph.equilibria.worst_cases import Corner, corners_of, held_over, worst_named, worst_over
 
 __all__ = [
@@ -27,6 +29,8 @@ __all__ = [
     "Completeness",
     "Corner",
     "CriticalCurve",
+    "EnergyBarrier",
+    "EnergyPath",
     "Event",
     "EventKind",
     "FoundStates",
@@ -36,11 +40,13 @@ __all__ = [
     "Lifts",
     "LimitLoad",
     "LimitLoads",
+    "Merge",
     "ParameterLine",
     "Path",
     "Settled",
     "TraceOptions",
     "Traces",
+    "TransitionNetwork",
     "Waypoint",
     "branch_curve",
     "branches",
@@ -60,6 +66,7 @@ __all__ = [
     "settle",
     "snap_landing",
     "trace",
+    "transition_network",
     "way_points",
     "worst_named",
     "worst_over",

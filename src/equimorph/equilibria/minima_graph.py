@@ -17,7 +17,7 @@ from scipy.sparse.csgraph import connected_components, csgraph_from_dense, dijks
 
 from equimorph.arrays import Items, Lanes
 from equimorph.equilibria.descents import descend
-from equimorph.equilibria.gradient_flow import Ending
+from equimorph.equilibria.gradient_flow import QUICK, Ending, Pace
 from equimorph.equilibria.random_search import PUSHED, Ground, Groups
 from equimorph.equilibria.saddles import Pairs, states_between
 from equimorph.structures import Growth
@@ -51,9 +51,9 @@ class MinimaGraph:
     A group is a point. States keep their numbers when others are added.
     """
 
-    def __init__(self, ground: Ground, z: Lanes, group: Groups) -> None:
-        """Begin with known states."""
-        self.ground = ground
+    def __init__(self, ground: Ground, z: Lanes, group: Groups, pace: Pace = QUICK) -> None:
+        """Begin with known states; `pace` is that of the descents."""
+        self.ground, self.pace = ground, pace
         self.z, self.group = np.zeros((0, ground.structure.size)), np.zeros(0, int)
         self.index, self._left = np.zeros(0, int), np.zeros(0, bool)
         self.edges: list[Edge] = []
@@ -90,14 +90,20 @@ class MinimaGraph:
         return len(self.z) - 1
 
     def descend(self) -> None:
-        """Follow the energy down from saddles of index one, until that leads to nothing new."""
+        """Follow the energy down from saddles of index one, until that leads to nothing new.
+
+        So it is from saddles of any index at which descents end, as those of symmetric states do.
+        """
         structure = self.ground.structure
         for _ in range(ROUNDS):
-            saddles = np.flatnonzero((self.index == 1) & ~self._left)
+            met = np.zeros(len(self), bool)
+            met[[edge.end for edge in self.edges if edge.end != NONE]] = True
+            saddles = np.flatnonzero(((self.index == 1) | met & (self.index > 1)) & ~self._left)
             if len(saddles) == 0:
                 return
             self._left[saddles] = True
-            led = descend(structure, self.z[saddles], self.ground.p[self.group[saddles]])
+            p = self.ground.p[self.group[saddles]]
+            led = descend(structure, self.z[saddles], p, self.pace)
             saddle, code = np.tile(saddles, 2), led.code.ravel()
             ends, group = led.z.reshape(-1, structure.size), self.group[saddle]
             good = np.isin(code, (Ending.LANDED, Ending.SADDLE))

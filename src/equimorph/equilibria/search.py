@@ -238,6 +238,21 @@ def search_points(
     InputError
         For less than one start or run.
     """
+    return search_with_graph(structure, points, within, starts, runs, seed)[0]
+
+
+def search_with_graph(
+    structure: Structure,
+    points: Points,
+    within: Sequence[Constraint],
+    starts: int,
+    runs: int,
+    seed: int,
+) -> tuple[list[FoundStates], MinimaGraph]:
+    """What `search_points` finds, and the graph of all states that served it.
+
+    The graph has also states beyond the constraints, as far as descents and lines met them.
+    """
     check_isolated(structure, points)
     generator, guesses = np.random.default_rng(seed), -(-starts // runs)
     catches = [_Catch.empty(structure, point, tuple(within)) for point in points]
@@ -252,24 +267,22 @@ def search_points(
         todo = np.array([point for point in todo if catches[point].doubtful], dtype=int)
         if len(todo) == 0:
             break
-    return _complete_by_arguments(structure, points, catches, generator)
+    return _complete_by_arguments(Ground(structure, points, tuple(within)), catches, generator)
 
 
 def _complete_by_arguments(
-    structure: Structure, points: Points, catches: list["_Catch"], generator: np.random.Generator
-) -> list[FoundStates]:
+    ground: Ground, catches: list["_Catch"], generator: np.random.Generator
+) -> tuple[list[FoundStates], MinimaGraph]:
     """What was found, with what the arguments add that no stable state is missing."""
-    if not catches:
-        return []
-    ground = Ground(structure, points, catches[0].ground.within)
-    group = np.repeat(np.arange(len(points)), [len(catch.z) for catch in catches])
-    graph = MinimaGraph(ground, np.concatenate([catch.z for catch in catches]), group)
+    group = np.repeat(np.arange(len(catches)), [len(catch.z) for catch in catches])
+    found = [np.zeros((0, ground.structure.size)), *(catch.z for catch in catches)]
+    graph = MinimaGraph(ground, np.concatenate(found), group)
     pushed = 0
     for _ in range(COMPLETIONS):
         known = len(graph)
         graph.descend()
         graph.connect()
-        lacking = [number for number in range(len(points)) if contradicts(graph, number)]
+        lacking = [number for number in range(len(catches)) if contradicts(graph, number)]
         pools = Pools(ground, generator, graph.z, graph.group)
         pools.push(pushed)
         pushed = len(graph)
@@ -280,10 +293,11 @@ def _complete_by_arguments(
         pools.spread(known)
         graph.add(pools.z[len(graph) :], pools.group[len(graph) :])
     graph.descend()
-    return [
+    states = [
         catch.with_states(graph.z[graph.group == number]).states(arguments_of(graph, number))
         for number, catch in enumerate(catches)
     ]
+    return states, graph
 
 
 @dataclass(frozen=True)
