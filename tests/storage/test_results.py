@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import xarray
 
+from equimorph.equilibria import limit_load
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.storage import Results, read_results, write_results
@@ -91,8 +92,29 @@ def test_xarray_opens_every_group_with_named_dimensions(spring_set: EquilibriumS
     with xarray.open_datatree(written, engine="h5netcdf") as tree:
         assert dict(tree["set"].sizes)["vertex"] == len(spring_set.points)
         assert tree["set"]["z"].dims == ("vertex", "unknown")
-        assert list(tree["set"]["parameter_name"].values) == ["x_l", "F", "k"]
+        assert list(tree["set"]["parameter"].values) == ["x_l", "F", "k"]
         assert tree["routes/over/schedule"]["values"].dims == ("step", "parameter")
+        structure = spring_set.structure
+        energy = tree["set"]["energy"]
+        assert energy.attrs["units"] == structure.descriptor("energy").unit
+        forces = tree["set"]["p"].sel(parameter="F")
+        assert str(forces["parameter_unit"].values) == structure.parameters[1].unit
+        np.testing.assert_array_equal(forces, spring_set.points["F"])
+
+
+def test_xarray_sees_the_numbers_of_any_answer(spring_set: EquilibriumSet, tmp_path: Path):
+    """Plain fields are attributes; arrays have the dimensions that their annotations name."""
+    angle = spring_set.structure.descriptor("angle")
+    here = spring_set.at(x_l=0.8, F=0.0).stable
+    limit = limit_load(here[int(angle(here).argmin())], "F")
+    answers = {"limit": {"one": limit}}
+    path = write_results(tmp_path / "r.h5", spring_set, angle, answers=answers)
+    with xarray.open_datatree(path) as tree:
+        found = tree["answers/limit/one"]
+        assert found.attrs["value"] == limit.value
+        assert found.attrs["kind"] == "fold"
+        assert found["path"]["length"].dims == ("point",)
+    assert read_results(path).answers["limit"]["one"].value == limit.value
 
 
 def test_the_grid_follows_the_vtkhdf_specification(spring_set: EquilibriumSet, written: Path):

@@ -76,10 +76,8 @@ def test_a_proof_of_an_older_release_has_the_status_that_its_bounds_bear(bounds,
 def test_a_file_says_which_records_it_holds(written: Path):
     with h5py.File(written) as file:
         assert dict(file["set"].attrs) == {"schema": "set", "schema_version": 1}
-        assert dict(file["answers/estimate/seen"].attrs) == {
-            "schema": "record",
-            "schema_version": 1,
-        }
+        words = {"schema": "record", "schema_version": 1}
+        assert words.items() <= dict(file["answers/estimate/seen"].attrs).items()
         assert file["routes/over"].attrs["schema"] == "route"
         about = json.loads(file["answers/estimate/seen/about"].asstr()[()])
         assert about["record"][0] == "StateEstimate"

@@ -102,7 +102,7 @@ def redundant(tmp_path_factory) -> Outcome:
 
 def test_a_landscape_has_values_where_the_piece_of_the_start_has_states(run):
     head, *settings = rows_of(run[1] / "upper-landscape.csv")
-    assert head == ["x_l", "F", "angle"]
+    assert head == ["x_l (natural length)", "F (k)", "angle (rad)"]
     assert len(settings) == 7 * 8
     known = np.array([[float(each) for each in row] for row in settings if row[2]])
     assert 0 < len(known) < len(settings)

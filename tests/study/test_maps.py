@@ -73,8 +73,9 @@ def test_the_table_of_a_map_gives_every_number_back(run):
     limits = run[0].of("map")["limits"]
     with (run[2] / "limits-map.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
+    shown = f"value ({limits.unit})"
     assert len(rows) == limits.value.size
-    values = np.array([float(row["value"] or "nan") for row in rows])
+    values = np.array([float(row[shown] or "nan") for row in rows])
     np.testing.assert_array_equal(values, limits.value.ravel())
     assert [row["status"] for row in rows] == [limits.kinds[k] for k in limits.status.ravel()]
 
@@ -190,3 +191,4 @@ def test_maps_have_groups_of_their_own(run):
     with h5py.File(run[2] / "results.h5") as file:
         assert set(file["maps"]) == {"limits", "angles"}
         assert file["maps/angles/value"].attrs["long_name"] == "angle"
+        assert file["maps/angles/value"].attrs["units"] == "rad"

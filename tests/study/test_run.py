@@ -59,7 +59,7 @@ def test_a_run_leaves_all_its_files(finished: tuple[Outcome, Path]):
     out = finished[1]
     figures = [f"{name}.{kind}" for name in [*FIGURES, "over-margins"] for kind in ("png", "svg")]
     others = ["results.h5", "over-schedule.csv", "over-schedule.json", "index.html", "study.toml"]
-    others.append("explorer.html")
+    others += ["explorer.html", "results.vtkhdf"]
     assert sorted(file.name for file in out.iterdir()) == sorted(
         [*figures, *others, "over-film.gif", "equimorph.json", ".equimorph"]
     )

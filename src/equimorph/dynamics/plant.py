@@ -13,27 +13,15 @@ from jaxtyping import Bool, Float, Int
 from equimorph.dynamics.linkage import Linkage, Settings, Vector
 from equimorph.dynamics.tree import WORLD, tree_of
 from equimorph.dynamics.writer import Spring, Writer
-from equimorph.errors import MissingError
+from equimorph.optional_packages import load_package
 
 Angles = Float[np.ndarray, " bodies"]
 
 
 def mujoco_module() -> Any:
-    """MuJoCo, which only a replay needs.
-
-    Raises
-    ------
-    MissingError
-        If it is not installed, with the line that installs it.
-    """
-    try:
-        import mujoco  # noqa: PLC0415  # an extra that only a replay needs
-    except ImportError:
-        raise MissingError(
-            '`simulator` must be installed; got "mujoco" without MuJoCo. Run: pip install '
-            '"equimorph[replay]", or choose simulator="own", which is not independent.'
-        ) from None
-    return mujoco
+    """MuJoCo, which only a replay needs; see `load_package`."""
+    otherwise = ', or choose simulator="own", which is not independent'
+    return load_package("mujoco", "replay", "simulator", otherwise)
 
 
 @dataclass(frozen=True, eq=False)

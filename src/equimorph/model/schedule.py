@@ -11,6 +11,7 @@ from scipy.interpolate import BPoly
 
 from equimorph.argument_checks import check_arguments
 from equimorph.errors import InputError, MissingError
+from equimorph.tables import Table, Tabular
 
 
 @runtime_checkable
@@ -102,12 +103,17 @@ class Rates:
         return np.concatenate([[0.0], np.cumsum(spent)])
 
 
+PROGRESS, MARGIN, TIME = "progress", "stability_margin", "time"
+"""Columns of tables beside parameters and descriptors."""
+DERIVATIVES = (("velocities", "rate", ""), ("accelerations", "acceleration", "²"))
+"""Fields of a schedule, how their columns are called, and the power of the time in their units."""
+
 Instants = float | Float[np.ndarray, "*instants"]
 
 
 @check_arguments
 @dataclass(frozen=True)
-class Schedule:
+class Schedule(Tabular):
     """All parameters of a structure, step by step along a verified route.
 
     Parameters
@@ -184,6 +190,26 @@ class Schedule:
             If the schedule has no times.
         """
         return float(self._timed()[-1])
+
+    @property
+    def table(self) -> Table:
+        """Time, progress, parameters, margin, descriptors, and rates of what moves, step by step.
+
+        Rates and accelerations are there if the schedule has them.
+        """
+        columns: dict[str, Float[np.ndarray, " steps"]] = {}
+        units = dict(zip(self.names, self.units, strict=True)) | {TIME: self.time_unit}
+        if self.times is not None:
+            columns[TIME] = self.times
+        columns |= {PROGRESS: self.progress, **self.parameters, MARGIN: self.margins}
+        columns |= self.descriptors
+        for key, word, power in DERIVATIVES:
+            rates = getattr(self, key)
+            for k, name in enumerate(self.names):
+                if rates is not None and name in self.moving:
+                    columns[f"{name} {word}"] = rates[:, k]
+                    units[f"{name} {word}"] = f"{self.units[k] or '1'}/{self.time_unit}{power}"
+        return Table(columns, units)
 
     @check_arguments
     def in_time(self, rates: Rates | None = None, *, duration: float | None = None) -> "Schedule":

@@ -17,11 +17,20 @@ from equimorph.charts import (
     rule_from,
 )
 from equimorph.errors import InputError
-from equimorph.storage.hdf import get, get_json, open_file, put, put_json, write
+from equimorph.storage.hdf import (
+    get,
+    get_json,
+    open_file,
+    put,
+    put_json,
+    put_parameters,
+    write,
+)
 from equimorph.storage.owner import Owner
 from equimorph.storage.sets import read_set, write_set
 from equimorph.storage.values import read_states
 from equimorph.structures import from_identity
+from equimorph.tables import units_of
 
 FORMAT = "equimorph chart"
 VERSION = 1
@@ -156,7 +165,7 @@ def _write_barrier(group: h5py.Group, barrier: Barrier) -> None:
     for side, states in (("near", barrier.near), ("far", barrier.far)):
         own = group.create_group(side)
         put(own, "z", states.z, ["state", "unknown"], "unknowns and multipliers")
-        put(own, "p", states.p, ["state", "parameter"], "parameters")
+        put_parameters(own, units_of(states.structure.parameters), {"p": states.p}, "state")
 
 
 def _read_barrier(group: h5py.Group, owner: Owner) -> Barrier:

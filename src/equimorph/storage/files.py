@@ -5,8 +5,8 @@ import fcntl
 import hashlib
 import io
 import json
-import math
 import os
+import shutil
 import socket
 import tempfile
 from collections.abc import Generator, Iterable
@@ -56,6 +56,14 @@ def move_whole(source: Path, target: Path) -> None:
     _synchronise(target.parent)
 
 
+def link_file(source: Path, target: Path) -> None:
+    """Give a file a second name; a copy where the file system has no links."""
+    try:
+        os.link(source, target)
+    except OSError:
+        shutil.copyfile(source, target)
+
+
 def write_bytes(path: Path, content: bytes) -> Path:
     """Write a file in one step."""
     with replacing(path) as partial:
@@ -73,11 +81,6 @@ def csv_text(rows: Iterable[Iterable[object]]) -> str:
     text = io.StringIO()
     csv.writer(text, lineterminator="\n").writerows(rows)
     return text.getvalue()
-
-
-def number_text(value: float) -> str:
-    """Return the shortest decimal that gives a number back exactly; nothing for no number."""
-    return repr(float(value)) if math.isfinite(value) else ""
 
 
 def write_csv(path: Path, rows: Iterable[Iterable[object]]) -> Path:

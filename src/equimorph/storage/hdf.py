@@ -8,7 +8,7 @@ has changed and so stripped of theirs.
 import hashlib
 import io
 import json
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import partial
 from importlib.metadata import version as release
@@ -25,6 +25,8 @@ from equimorph.storage.files import replacing
 
 BLOCK = 1 << 24
 """Bytes by which files in memory grow."""
+PARAMETER, PARAMETER_UNIT = "parameter", "parameter_unit"
+"""Coordinate of arrays with a column for each parameter, and the units along it."""
 MARK = b"equimorph-sha256"
 """Precedes the checksum at the end of a file."""
 
@@ -41,6 +43,7 @@ def put(
     values: Shaped[np.ndarray, "..."],
     dimensions: Sequence[str],
     meaning: str = "",
+    unit: str = "",
 ) -> h5py.Dataset:
     """Store an array with the names of its dimensions.
 
@@ -54,8 +57,8 @@ def put(
         Numbers or texts.
     dimensions
         One name per axis; made in `group` unless it or a group above has it.
-    meaning
-        What it is, with its unit, for people.
+    meaning, unit
+        What it is, and its unit, for people and for what reads the attribute ``units``.
     """
     array = np.asarray(values)
     plain = array.size == 0 or array.dtype.kind in "OU"
@@ -65,8 +68,7 @@ def put(
         filters |= {"compression": "gzip", "compression_opts": 1, "shuffle": True}
     kind = h5py.string_dtype() if array.dtype.kind in "OU" else array.dtype
     dataset = group.create_dataset(name, data=array.astype(kind, copy=False), dtype=kind, **filters)
-    if meaning:
-        dataset.attrs["long_name"] = meaning
+    _label(dataset, meaning, unit)
     for axis, (dimension, size) in enumerate(zip(dimensions, array.shape, strict=True)):
         dataset.dims[axis].attach_scale(_dimension(group, dimension, size))
     return dataset
@@ -232,13 +234,49 @@ def add_dimension(group: h5py.Group, name: str, size: int) -> h5py.Dataset:
 
 
 def put_coordinate(
-    group: h5py.Group, name: str, values: Shaped[np.ndarray, " n"], meaning: str = ""
+    group: h5py.Group, name: str, values: Shaped[np.ndarray, " n"], meaning: str, unit: str = ""
 ) -> None:
     """Store the places along a dimension of the same name, before the arrays that use it."""
-    dataset = group.create_dataset(name, data=values, fletcher32=True)
+    texts = values.dtype.kind in "OU"
+    kind = h5py.string_dtype() if texts else values.dtype
+    data = values.astype(kind, copy=False)
+    dataset = group.create_dataset(name, data=data, dtype=kind, fletcher32=not texts)
     dataset.make_scale(name)
-    if meaning:
-        dataset.attrs["long_name"] = meaning
+    _label(dataset, meaning, unit)
+
+
+def put_parameters(
+    group: h5py.Group,
+    units: Mapping[str, str],
+    arrays: Mapping[str, Shaped[np.ndarray, "..."]],
+    dimension: str,
+) -> None:
+    """Store arrays with a column for each parameter, which names and units label.
+
+    Parameters
+    ----------
+    group
+        Where they go.
+    units
+        By parameter, in the order of the columns.
+    arrays
+        By name.
+    dimension
+        Name of the rows.
+    """
+    if PARAMETER not in group:
+        put_coordinate(group, PARAMETER, np.array([*units], object), "name of the parameter")
+        each = np.array([*units.values()], object)
+        put(group, PARAMETER_UNIT, each, [PARAMETER], "unit of the parameter")
+    for name, values in arrays.items():
+        dataset = put(group, name, values, [dimension, PARAMETER], "parameters")
+        dataset.attrs["coordinates"] = PARAMETER_UNIT
+
+
+def _label(dataset: h5py.Dataset, meaning: str, unit: str) -> None:
+    for key, text in (("long_name", meaning), ("units", unit)):
+        if text:
+            dataset.attrs[key] = text
 
 
 def _dimension(group: h5py.Group, name: str, size: int) -> h5py.Dataset:
@@ -249,5 +287,5 @@ def _dimension(group: h5py.Group, name: str, size: int) -> h5py.Dataset:
         if isinstance(known, h5py.Dataset) and known.is_scale and known.shape == (size,):
             return known
         if place.name == "/":
-            return add_dimension(group, name, size)
+            return add_dimension(group, name if name not in group else f"{name}_{size}", size)
         place = place.parent

@@ -9,10 +9,11 @@ from jaxtyping import Float, Int
 
 from equimorph.argument_checks import check_arguments
 from equimorph.model import Grid
-from equimorph.storage.files import number_text, write_csv
-from equimorph.storage.hdf import get, get_json, put, put_coordinate, put_json
+from equimorph.storage.files import write_csv
+from equimorph.storage.hdf import get, get_json, put, put_coordinate, put_json, put_parameters
 from equimorph.storage.owner import Owner, words_of
 from equimorph.structures import States, Structure, join_states
+from equimorph.tables import units_of
 from equimorph.tasks.maps.actuator_map import ActuatorMap, natural_states_over
 from equimorph.tasks.maps.curvature import CurvatureMap
 from equimorph.tasks.maps.curves import MapCurve
@@ -24,15 +25,15 @@ ABOUT = "about"
 def write_map_group(group: h5py.Group, amap: ActuatorMap) -> None:
     """Write a map with its grid lines as coordinates; the curves one after the other."""
     first, second = amap.grid.names
+    units = units_of(amap.structure.parameters)
     for name, axis in zip((first, second), amap.grid.axes(), strict=True):
-        unit = next(each.unit for each in amap.structure.parameters if each.name == name)
-        put_coordinate(group, name, axis, unit)
+        put_coordinate(group, name, axis, name, units[name])
     kinds = "; ".join(f"{k}: {kind}" for k, kind in enumerate(amap.kinds))
     shown = amap.descriptor.name if isinstance(amap, CurvatureMap) else f"limit of {amap.load}"
-    put(group, "value", amap.value, [first, second], shown)
+    put(group, "value", amap.value, [first, second], shown, amap.unit)
     put(group, "status", amap.status, [first, second], kinds)
     put(group, "z", amap.states.z, ["setting", "unknown"], "unknowns and multipliers, row by row")
-    put(group, "p", amap.states.p, ["setting", "parameter"], "parameters")
+    put_parameters(group, units, {"p": amap.states.p}, "setting")
     curves = amap.curves
     put(group, "curve_kind", np.array([c.kind for c in curves], dtype=object), ["curve"])
     ends = np.cumsum([len(c.points) for c in curves], dtype=np.int64)
@@ -50,12 +51,13 @@ def write_map_group(group: h5py.Group, amap: ActuatorMap) -> None:
         _stack_curves(curves, "values", 2),
         ["point", "side"],
         "lower and higher",
+        amap.unit,
     )
     errors = np.concatenate([np.zeros(0), *(c.errors for c in curves)])
     put(group, "curve_error", errors, ["point"], "bound of the error along the grid line")
     states = join_states(amap.structure, [each.states for each in curves])
-    put(group, "curve_z", states.z, ["point", "unknown"])
-    put(group, "curve_p", states.p, ["point", "parameter"])
+    put(group, "curve_z", states.z, ["point", "unknown"], "unknowns and multipliers")
+    put_parameters(group, units, {"curve_p": states.p}, "point")
     put_json(group, ABOUT, _about(amap))
 
 
@@ -137,28 +139,4 @@ def write_map(amap: ActuatorMap, path: str | Path) -> tuple[Path, Path]:
     """
     table = Path(path)
     curves = table.with_name(f"{table.stem}-curves.csv")
-    return write_csv(table, rows_of_settings(amap)), write_csv(curves, rows_of_curves(amap))
-
-
-def rows_of_settings(amap: ActuatorMap) -> list[list[str]]:
-    """Values of a map, setting by setting, below a head."""
-    first, second = amap.grid.axes()
-    settings = ((x, y) for x in first.tolist() for y in second.tolist())
-    known = zip(amap.value.ravel().tolist(), amap.status.ravel().tolist(), strict=True)
-    rows = (
-        [repr(x), repr(y), number_text(value), amap.kinds[status]]
-        for (x, y), (value, status) in zip(settings, known, strict=True)
-    )
-    return [[*amap.grid.names, "value", "status"], *rows]
-
-
-def rows_of_curves(amap: ActuatorMap) -> list[list[str]]:
-    """Curves of a map, point by point, below a head."""
-    rows = (
-        [str(k), curve.kind, repr(x), repr(y), number_text(low), number_text(high), f"{error:.1e}"]
-        for k, curve in enumerate(amap.curves)
-        for (x, y), (low, high), error in zip(
-            curve.points.tolist(), curve.values.tolist(), curve.errors.tolist(), strict=True
-        )
-    )
-    return [["curve", "kind", *amap.grid.names, "lower", "higher", "error"], *rows]
+    return write_csv(table, amap.table.rows()), write_csv(curves, amap.curve_table.rows())

@@ -5,10 +5,11 @@ import numpy as np
 
 from equimorph.equilibria import Event, Path
 from equimorph.model import Schedule
-from equimorph.storage.hdf import get, get_json, put, put_json
+from equimorph.storage.hdf import get, get_json, put, put_coordinate, put_json, put_parameters
 from equimorph.storage.owner import Owner
 from equimorph.storage.values import read_value, write_value
 from equimorph.structures import State, States, Structure
+from equimorph.tables import units_of
 from equimorph.tasks.route import Route
 
 ABOUT, EVENTS, SCHEDULE, SNAPS = "about", "events", "schedule", "snaps"
@@ -48,13 +49,14 @@ def read_route(group: h5py.Group, owner: Owner) -> Route:
 
 def _write_path(group: h5py.Group, path: Path) -> None:
     put(group, "z", path.states.z, ["point", "unknown"], "unknowns and multipliers")
-    put(group, "p", path.states.p, ["point", "parameter"], "parameters")
+    units = units_of(path.states.structure.parameters)
+    put_parameters(group, units, {"p": path.states.p}, "point")
     put(group, "at", path.at, ["point"], "segment + share of it")
     put(group, "length", path.length, ["point"], "length from the start")
     put(group, "index", path.index, ["point"], "negative eigenvalues; 0 is stable")
     states = [event.state for event in path.events]
     put(group, "event_z", np.array([s.z for s in states]), ["event", "unknown"])
-    put(group, "event_p", np.array([s.p for s in states]), ["event", "parameter"])
+    put_parameters(group, units, {"event_p": np.array([s.p for s in states])}, "event")
     words = [[e.kind, e.at, e.criticality, e.detail] for e in path.events]
     put_json(group, EVENTS, words)
 
@@ -81,13 +83,20 @@ IN_TIME = ("times", "velocities", "accelerations")
 
 
 def _write_schedule(group: h5py.Group, schedule: Schedule) -> None:
-    put(group, "values", schedule.values, ["step", "parameter"], "parameters")
+    moments = {name: getattr(schedule, name) for name in ("velocities", "accelerations")}
+    arrays = {name: each for name, each in moments.items() if each is not None}
+    units = dict(zip(schedule.names, schedule.units, strict=True))
+    put_parameters(group, units, {"values": schedule.values, **arrays}, "step")
+    if schedule.times is not None:
+        put(group, "times", schedule.times, ["step"], "time", schedule.time_unit)
     put(group, "progress", schedule.progress, ["step"], "share of the length")
     put(group, "margins", schedule.margins, ["step"], "stability margin")
     put(group, "way_points", schedule.way_points, ["corner"], "steps at the corners")
     table = list(schedule.descriptors.values())
     table_array = np.array(table).reshape(len(table), len(schedule.progress))
-    put(group, "descriptors", table_array, ["descriptor", "step"], "see about")
+    if "descriptor" not in group:
+        put_coordinate(group, "descriptor", np.array([*schedule.descriptors], object), "name")
+    put(group, "descriptors", table_array, ["descriptor", "step"], "descriptors")
     about = {
         "names": schedule.names,
         "roles": schedule.roles,
@@ -96,11 +105,6 @@ def _write_schedule(group: h5py.Group, schedule: Schedule) -> None:
         "start": schedule.start,
         "time_unit": schedule.time_unit,
     }
-    for name in IN_TIME:
-        values = getattr(schedule, name)
-        if values is not None:
-            axes = ["step", "parameter"][: values.ndim]
-            put(group, name, values, axes, f"see about, per {schedule.time_unit}")
     put_json(group, ABOUT, about)
 
 

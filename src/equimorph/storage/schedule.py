@@ -21,15 +21,14 @@ from jaxtyping import Float
 from equimorph.argument_checks import check_arguments
 from equimorph.errors import InputError
 from equimorph.model import Schedule
+from equimorph.model.schedule import DERIVATIVES, MARGIN, PROGRESS, TIME
 from equimorph.storage.files import read_text, write_csv, write_text
+from equimorph.tables import heading
 
 FORMAT = "equimorph schedule"
 VERSION = 2
 """Version of the layout of the sidecar file; 1, without times and units, can be read."""
 READABLE = (1, VERSION)
-PROGRESS, MARGIN, TIME = "progress", "stability_margin", "time"
-DERIVATIVES = (("velocities", "rate", ""), ("accelerations", "acceleration", "²"))
-"""Fields of a schedule, how their columns are called, and the power of the time in their units."""
 COLUMNS = "columns"
 """Key of the numbers in a file of JSON alone."""
 
@@ -62,16 +61,16 @@ def write_schedule(schedule: Schedule, path: str | Path) -> tuple[Path, ...]:
     ``em.storage.write_schedule(route.schedule, "schedule.csv")``
     """
     table_path, sidecar_path = _paths(path)
-    columns = _columns(schedule)
-    table = np.column_stack(list(columns.values()))
+    head, *rows = schedule.table.rows()
+    table = np.column_stack([np.asarray(each) for each in schedule.table.columns.values()])
     sidecar = _sidecar(schedule)
     sidecar["checksum"] = _checksum(sidecar, table)
     if table_path is None:
-        lists = {name: values.tolist() for name, values in columns.items()}
+        lists = dict(zip(head, table.T.tolist(), strict=True))
         text = json.dumps({**sidecar, COLUMNS: lists}, indent=1, ensure_ascii=False)
         write_text(sidecar_path, text + "\n")
         return (sidecar_path,)
-    write_csv(table_path, [list(columns), *(map(repr, row) for row in table.tolist())])
+    write_csv(table_path, [head, *rows])
     write_text(sidecar_path, json.dumps(sidecar, indent=2, ensure_ascii=False) + "\n")
     return table_path, sidecar_path
 
@@ -112,14 +111,15 @@ def _schedule(sidecar: dict[str, Any], columns: dict[str, Column]) -> Schedule:
     names, units = tuple(sidecar["names"]), tuple(sidecar["units"])
     plain = sidecar["version"] == 1
     unit = sidecar.get("time_unit", "T")
-    heads = names if plain else [_head(*pair) for pair in zip(names, units, strict=True)]
+    heads = names if plain else list(map(heading, names, units))
     values = np.column_stack([columns[head] for head in heads])
     moments = {}
     for key, word, power in DERIVATIVES:
         if key in sidecar.get("derivatives", ()):
             moments[key] = np.zeros_like(values)
             for k, name in enumerate(names):
-                moments[key][:, k] = columns.get(_rate_head(name, word, units[k], unit, power), 0.0)
+                head = heading(f"{name} {word}", f"{units[k] or '1'}/{unit}{power}")
+                moments[key][:, k] = columns.get(head, 0.0)
     return Schedule(
         names=names,
         roles=tuple(sidecar["roles"]),
@@ -130,7 +130,7 @@ def _schedule(sidecar: dict[str, Any], columns: dict[str, Column]) -> Schedule:
         descriptors={name: columns[name] for name in sidecar["descriptors"]},
         start=sidecar["start"],
         way_points=np.array(sidecar["way_points"], dtype=int),
-        times=columns.get(_head(TIME, unit)),
+        times=columns.get(heading(TIME, unit)),
         time_unit=unit,
         **moments,
     )
@@ -142,34 +142,6 @@ def _paths(path: str | Path) -> tuple[Path | None, Path]:
     if given.suffix not in (".csv", ".json"):
         raise InputError(f"`path` must end in .csv or .json; got {given.name!r}.")
     return (given if given.suffix == ".csv" else None), given.with_suffix(".json")
-
-
-def _head(name: str, unit: str) -> str:
-    """Header of a column; numbers without unit have none."""
-    return f"{name} ({unit})" if unit not in ("", "1") else name
-
-
-def _rate_head(name: str, word: str, unit: str, time: str, power: str) -> str:
-    return f"{name} {word} ({unit if unit not in ('',) else '1'}/{time}{power})"
-
-
-def _columns(schedule: Schedule) -> dict[str, Column]:
-    """Columns of the table, by their headers."""
-    unit, out = schedule.time_unit, {}
-    if schedule.times is not None:
-        out[_head(TIME, unit)] = schedule.times
-    out[PROGRESS] = schedule.progress
-    for name, measure, values in zip(
-        schedule.names, schedule.units, schedule.values.T, strict=True
-    ):
-        out[_head(name, measure)] = values
-    out |= {MARGIN: schedule.margins, **schedule.descriptors}
-    for key, word, power in DERIVATIVES:
-        rates = getattr(schedule, key)
-        for k, name in enumerate(schedule.names):
-            if rates is not None and name in schedule.moving:
-                out[_rate_head(name, word, schedule.units[k], unit, power)] = rates[:, k]
-    return out
 
 
 def _sidecar(schedule: Schedule) -> dict[str, Any]:

@@ -15,11 +15,12 @@ from jaxtyping import Float, Int
 from equimorph.errors import InputError
 from equimorph.manifold import Boundary, BoundaryKind, EquilibriumSet
 from equimorph.manifold.complex.base_mesh import BaseMesh
-from equimorph.model import Box, Descriptor, names_of
-from equimorph.storage.hdf import add_dimension, get, get_json, put, put_json
+from equimorph.model import Box, Descriptor
+from equimorph.storage.hdf import add_dimension, get, get_json, put, put_json, put_parameters
 from equimorph.storage.owner import Owner, words_of
 from equimorph.storage.schemas import find_schema
 from equimorph.structures import States
+from equimorph.tables import units_of
 
 ABOUT = "about"
 GRID = ("vertices", "edges", "triangles", "sides", "tetrahedra", "faces")
@@ -48,24 +49,23 @@ def write_set(group: h5py.Group, eset: EquilibriumSet, height: Descriptor | None
         distinguishes states.
     """
     height = height or eset.structure.elevation
-    points, parameters = eset.points, names_of(eset.structure.parameters)
+    points = eset.points
     # At the top, so that the arrays keep their dimensions where the grid links to them; further
     # sets of a file, as regions have them, keep theirs to themselves.
     top = group if "vertex" in group.file else group.file
     for name, size in (("vertex", len(points)), ("cell", len(eset.cells)), ("space", 3)):
         add_dimension(top, name, size)
     add_dimension(top, "corner", eset.cells.size)
-    put(group, "parameter_name", np.array(parameters), ["parameter"])
     put(group, "z", points.z, ["vertex", "unknown"], "unknowns and multipliers")
-    put(group, "p", points.p, ["vertex", "parameter"], "parameters, see parameter_name")
+    put_parameters(group, units_of(eset.structure.parameters), {"p": points.p}, "vertex")
     put(group, "kind", eset.kinds, ["vertex"], "see EquilibriumSet.kinds")
     put(group, "grid_vertex", eset.grid_vertex, ["vertex"], "vertex of the grid below, or -1")
     put(group, "index", eset.index, ["vertex"], "negative eigenvalues; 0 is stable")
-    put(group, "energy", points.energy, ["vertex"], "potential energy")
-    for one in {d.name: d for d in [height, *(c.descriptor for c in eset.constraints)]}.values():
+    shown = [eset.structure.descriptor("energy"), height]
+    for one in {d.name: d for d in [*shown, *(c.descriptor for c in eset.constraints)]}.values():
         name = one.name.replace("/", "_over_")
         if name not in group:
-            put(group, name, one(points), ["vertex"], one.unit)
+            put(group, name, one(points), ["vertex"], one.name, one.unit)
     each = f"vertices of each cell, {eset.cells.shape[1]} at a time"
     put(group, "connectivity", eset.cells.ravel(), ["corner"], each)
     put(group, "cell_index", eset.cell_index, ["cell"], "index of the stratum")

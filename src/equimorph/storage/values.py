@@ -6,34 +6,40 @@ constraints are kept by name: the structure knows the rest.
 """
 
 from collections.abc import Callable, Mapping
-from typing import Any
+from types import UnionType
+from typing import Any, get_args
 
 import h5py
 import numpy as np
+from jaxtyping import Shaped
 
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Box, Constraint, Descriptor, Grid
-from equimorph.storage.hdf import get, get_json, put, put_json
+from equimorph.storage.hdf import get, get_json, put, put_json, put_parameters
 from equimorph.storage.maps import read_map_group, write_map_group
 from equimorph.storage.owner import Owner, words_of
-from equimorph.storage.schemas import find_schema, schema_of
+from equimorph.storage.schemas import Schema, find_schema, schema_of
 from equimorph.storage.sets import read_set, write_set
 from equimorph.structures import State, States
+from equimorph.tables import units_of
 from equimorph.tasks.maps.curvature import CurvatureMap
 from equimorph.tasks.maps.limit_load import LimitLoadMap
 
 ABOUT = "about"
+LONGEST = 1000
+"""Characters of texts that are attributes of their record, too."""
 Inner = Callable[[Any], Any]
 
 
 def write_states(group: h5py.Group, states: States) -> None:
     """Write states with their parameters, energies, margins and shapes."""
     put(group, "z", states.z, ["state", "unknown"], "unknowns and multipliers")
-    put(group, "p", states.p, ["state", "parameter"], "parameters")
+    put_parameters(group, units_of(states.structure.parameters), {"p": states.p}, "state")
     put(group, "index", states.index, ["state"], "negative eigenvalues; 0 is stable")
     put(group, "margin", states.margin, ["state"], "stability margin")
-    put(group, "energy", states.energy, ["state"], "potential energy")
+    unit = states.structure.descriptor("energy").unit
+    put(group, "energy", states.energy, ["state"], "potential energy", unit)
 
 
 def read_states(group: h5py.Group, owner: Owner) -> States:
@@ -50,6 +56,11 @@ def write_value(group: h5py.Group, value: Any) -> None:
         If it holds something that no file can hold, like a function.
     """
     put_json(group, ABOUT, _encode(group, value, ""))
+    schema = schema_of(value)
+    for key, each in ({} if schema is None else schema.values(value)).items():
+        if isinstance(each, np.generic | float | int | str) and len(str(each)) < LONGEST:
+            plain = each.item() if isinstance(each, np.generic) else each
+            group.attrs[key] = str(plain) if isinstance(plain, str) else plain
 
 
 def read_value(group: h5py.Group, owner: Owner) -> Any:
@@ -78,10 +89,22 @@ def _encode(group: h5py.Group, value: Any, place: str) -> Any:
         return {"mapping": _pairs(group, value, place)}
     schema = schema_of(value)
     if schema is not None:
-        named = schema.values(value).items()
-        own = {key: _encode(group, each, _inside(place, key)) for key, each in named}
+        own = _encode_fields(group, schema, value, place)
         return {"record": [schema.name, own, schema.change.version]}
     return _put(group, value, place)
+
+
+def _encode_fields(group: h5py.Group, schema: Schema, value: Any, place: str) -> dict[str, Any]:
+    """Plain data that stands for the fields of a record."""
+    own: dict[str, Any] = {}
+    kinds = {each.name: each.type for each in schema.fields}
+    for key, each in schema.values(value).items():
+        inside = _inside(place, key)
+        if isinstance(each, np.ndarray):
+            own[key] = _put_array(group, each, inside, _axes(kinds, key, each.ndim))
+        else:
+            own[key] = _encode(group, each, inside)
+    return own
 
 
 def _inside(place: str, name: str | int) -> str:
@@ -100,8 +123,7 @@ def _put(group: h5py.Group, value: Any, place: str) -> Any:
     """Write a value with a special form; return its place or its name."""
     match value:
         case np.ndarray():
-            axes = [f"{place.replace('/', '.')}.{axis}" for axis in range(value.ndim)]
-            put(group, place, value, axes)
+            return _put_array(group, value, place, _axes({}, place.rpartition("/")[2], value.ndim))
         case State():
             write_states(group.create_group(place), value.batch)
         case States():
@@ -111,11 +133,38 @@ def _put(group: h5py.Group, value: Any, place: str) -> Any:
         case EquilibriumSet():
             write_set(group.create_group(place), value)
         case _:
-            return _encode_fields(value, place)
+            return _encode_named(value, place)
     return {type(value).__name__: place}
 
 
-def _encode_fields(value: Any, place: str) -> Any:
+def _put_array(
+    group: h5py.Group, value: Shaped[np.ndarray, "..."], place: str, axes: list[str]
+) -> dict[str, str]:
+    """Write an array, and return its place; its dimensions are those of its own record."""
+    inner, _, name = place.rpartition("/")
+    put(group.require_group(inner) if inner else group, name, value, axes)
+    return {"ndarray": place}
+
+
+def _axes(kinds: Mapping[str, Any], key: str, rank: int) -> list[str]:
+    """Names of the dimensions of an array: in the singular what its annotation calls them.
+
+    Names of fields are taken: a variable called like a dimension holds the places along it.
+    """
+    found = [getattr(each, "dim_str", "").split() for each in _alternatives(kinds.get(key))]
+    words = next((each for each in found if len(each) == rank), [""] * rank)
+    names = [word.removesuffix("s") for word in words]
+    return [
+        name if name.isidentifier() and name not in kinds else f"{key}_{axis}"
+        for axis, name in enumerate(names)
+    ]
+
+
+def _alternatives(annotation: Any) -> tuple[Any, ...]:
+    return get_args(annotation) if isinstance(annotation, UnionType) else (annotation,)
+
+
+def _encode_named(value: Any, place: str) -> Any:
     """Plain data for what has names and numbers only."""
     match value:
         case Descriptor():

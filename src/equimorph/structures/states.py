@@ -17,6 +17,7 @@ from equimorph.model import Drawing, names_of, position
 from equimorph.structures.contract import Structure
 from equimorph.structures.margin import stability_margin
 from equimorph.structures.vibration import vibrations
+from equimorph.tables import heading, units_of
 
 SHOWN = 20
 """Number of states that notebooks show."""
@@ -72,14 +73,14 @@ class States:
         """Table of parameters that differ, index, margin and energy, for notebooks."""
         shown, parameters = self[:SHOWN], self.structure.parameters
         names = [each.name for each in parameters if len(set(self[each.name].tolist())) != 1]
-        units = {each.name: each.unit for each in parameters}
+        units = units_of(parameters)
         energy = self.structure.descriptor("energy").unit
         columns = [*(shown[name] for name in names), shown.index, shown.margin, shown.energy]
         head = [
-            *(f"{name} ({units[name]})" for name in names),
+            *(heading(name, units[name]) for name in names),
             "index",
             "margin",
-            f"energy ({energy})",
+            heading("energy", energy),
         ]
         more = f", the first {SHOWN}" if len(self) > SHOWN else ""
         rows = [[k, *row] for k, row in enumerate(zip(*columns, strict=True))]

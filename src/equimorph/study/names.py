@@ -2,6 +2,8 @@
 
 INPUT_COPY = "study.toml"
 RESULTS = "results.h5"
+GRID = "results.vtkhdf"
+"""The same file under the name by which ParaView knows it, where there is a set to be shown."""
 REPORT = "index.html"
 EXPLORER = "explorer.html"
 

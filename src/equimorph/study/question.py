@@ -33,6 +33,7 @@ from equimorph.study.findings import Findings
 from equimorph.study.lookup import Extent, Ground, Later, at_key
 from equimorph.study.names import schedule_table, task_files
 from equimorph.study.signatures import arguments_of
+from equimorph.tables import Table
 
 A = TypeVar("A")
 Drawing = Axes | Drawn
@@ -78,11 +79,11 @@ def pictures(folder: Path, figures: Sequence[Figure]) -> list[str]:
 
 @dataclass(frozen=True)
 class DataTable:
-    """A table for other programs: name of its file, what it holds, and its rows, the head first."""
+    """A table for other programs: name of its file, what it holds, and the table itself."""
 
     file: str
     content: str
-    rows: Sequence[Sequence[object]]
+    table: Table
 
 
 @dataclass(frozen=True)
@@ -304,7 +305,7 @@ class Kind(ABC, Generic[A]):
     def write_files(self, question: Question, answer: A, folder: Path) -> None:
         """Write tables and schedules."""
         for table in self.tables(question, answer):
-            write_csv(folder / table.file, table.rows)
+            write_csv(folder / table.file, table.table.rows())
         for name, schedule in self.schedules(question, answer).items():
             write_schedule(schedule, folder / schedule_table(name))
 

@@ -188,8 +188,9 @@ def _set(outcome: Outcome, eset: EquilibriumSet, folder: Path) -> list[str]:
         *pictures(folder, _figures_of_set(outcome, eset)),
         f"<h3>Audit: {word}</h3>",
         html.table([], rows, "words"),
-        '<p>All of it is in <a href="results.h5">results.h5</a>, for ParaView '
-        "(<code>/VTKHDF</code>) and xarray (engine h5netcdf, group <code>set</code>).</p>",
+        '<p>All of it is in <a href="results.h5">results.h5</a> for xarray '
+        '(<code>xarray.open_datatree</code>), and under the name <a href="results.vtkhdf">'
+        "results.vtkhdf</a> for ParaView and <code>pyvista.read</code>.</p>",
     ]
 
 

@@ -15,14 +15,14 @@ from equimorph.logs import log_of
 from equimorph.manifold import EquilibriumSet, equilibrium_set
 from equimorph.model import Progress, Silent
 from equimorph.storage import write_results
-from equimorph.storage.files import read_text
+from equimorph.storage.files import link_file, read_text
 from equimorph.structures import States
 from equimorph.study.checkpoints import Checkpoints
 from equimorph.study.findings import StudyError, lines_of
 from equimorph.study.folder import ResultsFolder, open_results_folder
 from equimorph.study.lookup import Extent, Ground, at_key
 from equimorph.study.memory import MemoryWatch, check_memory
-from equimorph.study.names import INPUT_COPY, REPORT, RESULTS, route_name
+from equimorph.study.names import GRID, INPUT_COPY, REPORT, RESULTS, route_name
 from equimorph.study.prepare import Answered, Outcome, Problem, prepare
 from equimorph.study.problem import Study, parse_study, read_study_text, sound_part
 from equimorph.study.question import Question
@@ -210,8 +210,11 @@ def _store(outcome: Outcome, folder: ResultsFolder, text: str) -> None:
         (staging / INPUT_COPY).write_text(text, encoding="utf-8")
         for each in outcome.answers:
             each.question.kind.write_files(each.question, each.answer, staging)
-        if not folder.holds([RESULTS]):
+        names = [RESULTS] if outcome.equilibrium_set is None else [RESULTS, GRID]
+        if not folder.holds(names):
             _write_results(outcome, staging / RESULTS)
+            for name in names[1:]:
+                link_file(staging / RESULTS, staging / name)
 
 
 def _write_results(outcome: Outcome, path: Path) -> None:

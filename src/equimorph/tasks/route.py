@@ -73,6 +73,18 @@ class Route:
         """States along the route; for a refused one up to its end, None if it did not begin."""
         return self.path.states if self.path else None
 
+    def frame(self) -> Any:
+        """All steps of the schedule as a `pandas.DataFrame` with units; see `Schedule.frame`.
+
+        Raises
+        ------
+        InputError
+            If the route was refused, or pandas is not installed.
+        """
+        if self.schedule is None:
+            raise InputError(f"`route` must have arrived; it was refused: {self.why}")
+        return self.schedule.frame()
+
 
 def refusal(why: str, way_points: Corners | None = None, path: Path | None = None) -> Route:
     """Route that does not exist, and why."""

@@ -14,12 +14,14 @@ from equimorph.errors import InputError
 from equimorph.html_tables import html_table
 from equimorph.manifold.complex.audit import Audit
 from equimorph.manifold.complex.base_mesh import BaseMesh
+from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.setting import Setting
 from equimorph.manifold.lookup.near_crossings import NearCrossings, of_set
 from equimorph.manifold.lookup.over import Sheets
 from equimorph.manifold.lookup.states_over import StatesOver
 from equimorph.model import Box, Constraint, parameter_vector, position
 from equimorph.structures import States, Structure
+from equimorph.tables import Table, Tabular, units_of
 from equimorph.tolerances import IN_BOX
 
 
@@ -69,7 +71,7 @@ class Boundary:
 
 
 @dataclass(frozen=True, eq=False)
-class EquilibriumSet:
+class EquilibriumSet(Tabular):
     """Equilibria over a box in d = 1, 2 or 3 free parameters, with their connections.
 
     Vertices are exact states: over the grid, on folds, on constraints. Cells are segments,
@@ -124,7 +126,7 @@ class EquilibriumSet:
 
     def _repr_html_(self) -> str:
         """Table of the box, the size and the audit, for notebooks."""
-        units = {each.name: each.unit for each in self.structure.parameters}
+        units = units_of(self.structure.parameters)
         sides = zip(self.box.names, self.box.lower, self.box.upper, strict=True)
         rows: list[list[object]] = [
             [name, f"{low:g} to {high:g} {units[name]}"] for name, low, high in sides
@@ -133,6 +135,22 @@ class EquilibriumSet:
         rows += [["components", len(self.components)], ["strata", len(self.strata)]]
         rows += [["folds", len(self.folds)], ["audit", str(self.audit)]]
         return html_table(f"Equilibrium set of a {self.structure.kind}", [], rows)
+
+    @property
+    def table(self) -> Table:
+        """All vertices; see `frame`.
+
+        Its columns are all parameters, what the vertex lies on (``kind``, see `VertexKind`), the
+        ``index``, which is 0 where it is stable, the ``energy``, the descriptor that distinguishes
+        states of the structure, and those that are bounded.
+        """
+        kinds = np.array([kind.name.lower() for kind in VertexKind])[self.kinds]
+        bounded = (each.descriptor for each in self.constraints)
+        shown = [self.structure.descriptor("energy"), self.structure.elevation, *bounded]
+        measured = {each.name: each for each in shown}
+        columns = {**self.points.parameters, "kind": kinds, "index": self.index}
+        columns |= {name: each(self.points) for name, each in measured.items()}
+        return Table(columns, units_of((*self.structure.parameters, *shown)))
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -11,6 +11,7 @@ from jaxtyping import Float, Int
 from equimorph.errors import InputError
 from equimorph.linalg.lanes import over_lanes
 from equimorph.linalg.sparse import SparseLayout
+from equimorph.optional_packages import load_package
 from equimorph.structures.energy.kernels import OPERATIONS, run_lanes
 
 ROUGH = frozenset({
@@ -21,21 +22,8 @@ _SAME = {"const": "constant", "constpow": "pow"}
 
 
 def casadi() -> Any:
-    """CasADi, an optional package of 280 MB, loaded on first use.
-
-    Raises
-    ------
-    InputError
-        If it is not installed.
-    """
-    try:
-        import casadi as package  # noqa: PLC0415  # optional and heavy
-    except ImportError:
-        raise InputError(
-            "`EnergyStructure` must have the package casadi; got none. "
-            "Install it: pip install 'equimorph[energy]'."
-        ) from None
-    return package
+    """CasADi, an optional package of 280 MB; see `load_package`."""
+    return load_package("casadi", "energy", "EnergyStructure")
 
 
 @lru_cache(maxsize=1)

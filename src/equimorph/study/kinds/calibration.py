@@ -16,7 +16,6 @@ from equimorph.equilibria import lift
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import parameter_vector
-from equimorph.storage.files import number_text
 from equimorph.structures import States, Structure, from_identity
 from equimorph.study import html
 from equimorph.study.answers import count_of
@@ -24,6 +23,7 @@ from equimorph.study.data_files import DataFile, Measured, measured_shapes
 from equimorph.study.fields import Point, Positive
 from equimorph.study.lookup import at_key
 from equimorph.study.question import Arguments, DataTable, Figure, Kind, Question, still
+from equimorph.tables import Column, Table
 from equimorph.tasks.calibration.calibrate import Calibration, calibrate
 from equimorph.tasks.calibration.measurements import MeasuredShape
 from equimorph.tasks.calibration.unknowns import Family
@@ -96,22 +96,24 @@ class CalibrationKind(Kind[Calibration]):
 
     def tables(self, question: Question, answer: Calibration) -> list[DataTable]:
         """Return the unknowns with their covariances; measured and fitted points side by side."""
-        head = ["unknown", "value", "deviation", *[f"covariance with {x}" for x in answer.names]]
-        columns = zip(
-            answer.names, answer.values, answer.deviations, answer.covariance, strict=True
-        )
-        unknowns = [[name, *map(number_text, [x, error, *row])] for name, x, error, row in columns]
+        unknowns: dict[str, Column] = {"unknown": answer.names, "value": answer.values}
+        unknowns["deviation"] = answer.deviations
+        unknowns |= {
+            f"covariance with {name}": column
+            for name, column in zip(answer.names, answer.covariance.T, strict=True)
+        }
         shape: MeasuredShape = question.extra.measured.shape
         points, s = (np.asarray(each, dtype=float) for each in (shape.points, shape.s))
-        compared = [["state", "s", "x", "y", "fitted x", "fitted y"]]
-        for state, own in enumerate(zip(points, answer.states.shape(s), strict=True), 1):
-            for place, here, there in zip(s, *own, strict=True):
-                if np.isfinite(here).any():
-                    compared.append([str(state), *map(number_text, [place, *here, *there])])
-        files = question.files
+        state, place = np.nonzero(np.isfinite(points).any(axis=2))
+        compared: dict[str, Column] = {"state": state + 1, "s": s[place]}
+        pairs = (("", points), ("fitted ", answer.states.shape(s)))
+        axes = [f"{word}{axis}" for word, _ in pairs for axis in "xy"]
+        compared |= dict(zip(axes, np.concatenate(
+            [each[state, place] for _, each in pairs], axis=1).T, strict=True))  # fmt: skip
+        units, files = dict.fromkeys(axes, answer.states.structure.length_unit), question.files
         return [
-            DataTable(f"{files}.csv", "unknowns and covariances", [head, *unknowns]),
-            DataTable(f"{files}-points.csv", "measured and fitted", compared),
+            DataTable(f"{files}.csv", "unknowns and covariances", Table(unknowns)),
+            DataTable(f"{files}-points.csv", "measured and fitted", Table(compared, units)),
         ]
 
     def figures(

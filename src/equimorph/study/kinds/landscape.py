@@ -6,9 +6,9 @@ import numpy as np
 
 from equimorph import plotting
 from equimorph.manifold import EquilibriumSet
-from equimorph.storage.files import number_text
 from equimorph.study import html
 from equimorph.study.question import DataTable, Figure, Kind, Question, still
+from equimorph.tables import Column, Table, units_of
 from equimorph.tasks.optimising.landscapes import Landscape, landscape
 
 NO_JUMP = 1e-9
@@ -24,23 +24,24 @@ class LandscapeKind(Kind[Landscape]):
     def tables(self, question: Question, answer: Landscape) -> list[DataTable]:
         """Return settings with their values, and the edges that cross barriers."""
         names, axes = answer.grid.names, answer.grid.axes()
-        settings = [
-            [*map(repr, (x, y)), number_text(value)]
-            for x, line in zip(axes[0].tolist(), answer.value.tolist(), strict=True)
-            for y, value in zip(axes[1].tolist(), line, strict=True)
-        ]
-        barriers, corners = answer.barriers, [f"{name} {k}" for k in (1, 2) for name in names]
-        edges = [
-            [kind, *map(repr, [*ends.ravel().tolist(), *values.tolist()])]
-            for kind, ends, values in zip(
-                barriers.kind, barriers.ends, barriers.values, strict=True
-            )
-        ]
-        kinds = [["kind", *corners, "value 1", "value 2"]]
-        files, head = question.files, [*names, question["objective"].name]
+        own, objective = question.structure.parameters, question["objective"]
+        units = units_of((*own, objective))
+        places = zip(names, np.meshgrid(*axes, indexing="ij"), strict=True)
+        settings = {name: each.ravel() for name, each in places}
+        settings[objective.name] = answer.value.ravel()
+        barriers = answer.barriers
+        edges: dict[str, Column] = {"kind": barriers.kind}
+        for end in (0, 1):
+            for k, name in enumerate(names):
+                edges[f"{name} {end + 1}"] = barriers.ends[:, end, k]
+                units[f"{name} {end + 1}"] = units[name]
+        for end in (0, 1):
+            edges[f"value {end + 1}"] = barriers.values[:, end]
+            units[f"value {end + 1}"] = objective.unit
+        files = question.files
         return [
-            DataTable(f"{files}.csv", "settings", [head, *settings]),
-            DataTable(f"{files}-barriers.csv", "barriers", [*kinds, *edges]),
+            DataTable(f"{files}.csv", "settings", Table(settings, units)),
+            DataTable(f"{files}-barriers.csv", "barriers", Table(edges, units)),
         ]
 
     def figures(

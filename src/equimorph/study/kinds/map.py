@@ -11,7 +11,6 @@ from equimorph import plotting
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Descriptor
-from equimorph.storage.maps import rows_of_curves, rows_of_settings
 from equimorph.study import html
 from equimorph.study.composite_arguments import unloaded_load
 from equimorph.study.fields import Number, requirement
@@ -75,8 +74,8 @@ class MapKind(Kind[ActuatorMap]):
         """Return settings and curves."""
         files = question.files
         return [
-            DataTable(f"{files}.csv", "settings", rows_of_settings(answer)),
-            DataTable(f"{files}-curves.csv", "curves", rows_of_curves(answer)),
+            DataTable(f"{files}.csv", "settings", answer.table),
+            DataTable(f"{files}-curves.csv", "curves", answer.curve_table),
         ]
 
     def figures(

@@ -19,6 +19,7 @@ from equimorph.study.answers import as_route, figures_of_way, place_of
 from equimorph.study.fields import Positive
 from equimorph.study.lookup import at_key
 from equimorph.study.question import DataTable, Figure, Kind, Question, still
+from equimorph.tables import Table, units_of
 from equimorph.tasks.timing.retiming import retime
 from equimorph.tasks.verification.schedule_check import Verification
 
@@ -136,9 +137,10 @@ class ReplayKind(Kind[Replay]):
         """Parameters and deviations over time."""
         names = names_of(answer.structure.parameters)
         parts = ("deviation", "discretisation", "dynamics")
-        columns = [answer.times, *answer.parameters.T, *(getattr(answer, each) for each in parts)]
-        rows = [["time", *names, *parts], *np.column_stack(columns).tolist()]
-        return [DataTable(f"{question.files}.csv", "deviation over time", rows)]
+        columns = {"time": answer.times, **dict(zip(names, answer.parameters.T, strict=True))}
+        columns |= {each: getattr(answer, each) for each in parts}
+        units = units_of(answer.structure.parameters) | {"time": answer.structure.time_unit}
+        return [DataTable(f"{question.files}.csv", "deviation over time", Table(columns, units))]
 
 
 def _film(played: Replay, name: str, folder: Path) -> None:

@@ -15,6 +15,7 @@ from equimorph.manifold import EquilibriumSet
 from equimorph.study import html
 from equimorph.study.fields import Number, requirement
 from equimorph.study.question import Arguments, DataTable, Figure, Kind, Question, still
+from equimorph.tables import Column, Table, units_of
 from equimorph.tasks.reach.query import Answer
 from equimorph.tasks.reach.reachable_sets import Reach, attainable, reachable
 
@@ -68,13 +69,18 @@ class ReachKind(Kind[Reached]):
     def tables(self, question: Question, answer: Reached) -> list[DataTable]:
         """Return the boundary: one row for each of its states."""
         reach, names = answer[0], answer[0].whole.names
-        shown = [each.name for each in question["descriptors"]]
-        rows: list[list[object]] = [["piece", "kind", "detail", *names, *shown]]
-        for number, piece in enumerate(reach.boundary):
-            columns = zip(*(piece.states[name].tolist() for name in names), strict=True)
-            for setting, values in zip(columns, piece.values.tolist(), strict=True):
-                rows.append([number, piece.kind, piece.detail, *setting, *values])
-        return [DataTable(f"{question.files}.csv", "all states of the boundary", rows)]
+        shown, pieces = question["descriptors"], reach.boundary
+        of = np.repeat(np.arange(len(pieces)), [len(each.states) for each in pieces])
+        words = {key: np.array([getattr(each, key) for each in pieces], object)[of]
+                 for key in ("kind", "detail")}  # fmt: skip
+        columns: dict[str, Column] = {"piece": of, **words}
+        for name in names:
+            columns[name] = np.concatenate([np.zeros(0), *(each.states[name] for each in pieces)])
+        for k, each in enumerate(shown):
+            values = [piece.values[:, k] for piece in pieces]
+            columns[each.name] = np.concatenate([np.zeros(0), *values])
+        table = Table(columns, units_of((*question.structure.parameters, *shown)))
+        return [DataTable(f"{question.files}.csv", "all states of the boundary", table)]
 
     def figures(
         self, question: Question, eset: EquilibriumSet | None, answer: Reached

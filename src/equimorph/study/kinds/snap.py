@@ -10,16 +10,19 @@ from pydantic import Field
 
 from equimorph import plotting
 from equimorph.manifold import EquilibriumSet, Snap, SnapGraph, snap_graph
-from equimorph.model import Descriptor
+from equimorph.model import Descriptor, names_of
 from equimorph.structures import State, States, join_states
 from equimorph.study import html
 from equimorph.study.answers import count_of, figures_of_states, table_of_states
 from equimorph.study.lookup import descriptor_at
 from equimorph.study.question import Arguments, DataTable, Figure, Kind, Question, still
+from equimorph.tables import Table, units_of
 from equimorph.tasks.robustness.snaps import LeastSnap, least_snap
 
 Snaps = tuple[tuple[int, ...], tuple[Snap, ...], tuple[States, ...]]
 """Stable strata, runs of their boundaries, and the states from which the snaps of each begin."""
+HEAD = ("run", "from stratum", "to stratum", "status", "energy released")
+"""Columns of the table before parameters and heights."""
 CAPTION = (
     "The stability boundary in runs from which all snaps lead to the same stratum, numbered as in "
     "the table: over the parameters, and states before and after the snap along it."
@@ -106,11 +109,11 @@ class SnapGraphKind(Kind[Snaps]):
 
     def tables(self, question: Question, answer: Snaps) -> list[DataTable]:
         """Return every snap that was followed: from where, to where, and the energy released."""
-        head = ["run", "from stratum", "to stratum", "status", "energy released"]
-        value, parameters = question.extra, _parameters(answer)
-        rows: list[list[object]] = [
-            [*head, *parameters, f"{value.name} before", f"{value.name} after"]
-        ]
+        value = question.extra
+        ends = [f"{value.name} {when}" for when in ("before", "after")]
+        units = units_of(question.structure.parameters) | dict.fromkeys(ends, value.unit)
+        units[HEAD[-1]] = question.structure.descriptor("energy").unit
+        rows: list[list[object]] = []
         for number, (snap, states) in enumerate(zip(*answer[1:], strict=True), start=1):
             for state, landing in zip(states, snap.landings, strict=True):
                 after = value(landing.state) if landing.landed else ""
@@ -118,7 +121,9 @@ class SnapGraphKind(Kind[Snaps]):
                     number, snap.source, snap.target, landing.status, landing.released,
                     *state.parameters.values(), value(state), after,
                 ])  # fmt: skip
-        told = DataTable(f"{question.files}.csv", "every snap that was followed", rows)
+        names = [*HEAD, *names_of(question.structure.parameters), *ends]
+        table = Table(dict(zip(names, zip(*rows, strict=True), strict=True)), units)
+        told = DataTable(f"{question.files}.csv", "every snap that was followed", table)
         return [told] if answer[1] else []
 
     def figures(
@@ -146,7 +151,7 @@ class SnapGraphKind(Kind[Snaps]):
             return []
         varied = [
             name
-            for name in _parameters(answer)
+            for name in names_of(question.structure.parameters)
             if np.ptp(np.concatenate([states[name] for states in answer[2]])) > 0.0
         ]
         head = ["run", "from", "to", *map(escape, varied), "snaps followed", "energy released"]
@@ -162,11 +167,6 @@ class SnapGraphKind(Kind[Snaps]):
             for number, (snap, states) in enumerate(zip(*answer[1:], strict=True), start=1)
         ]
         return [html.table(head, rows)]
-
-
-def _parameters(answer: Snaps) -> list[str]:
-    """Names of all parameters."""
-    return list(answer[2][0][0].parameters) if answer[2] else []
 
 
 def _lean(snap: Snap) -> Snap:

@@ -1,6 +1,6 @@
 """Maps over a grid of actuator settings: what they have in common, and how they are computed."""
 
-from abc import ABC
+from abc import abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
@@ -14,6 +14,7 @@ from equimorph.errors import InputError
 from equimorph.html_tables import html_table
 from equimorph.model import Constraint, Grid, Progress, Silent, parameter_vector, position
 from equimorph.structures import State, States, Structure
+from equimorph.tables import Table, Tabular, units_of
 from equimorph.tasks.maps.causes import Paths
 from equimorph.tasks.maps.curves import (
     MapCurve,
@@ -25,7 +26,7 @@ from equimorph.tolerances import IN_BOX
 
 
 @dataclass(frozen=True, eq=False)
-class ActuatorMap(ABC):
+class ActuatorMap(Tabular):
     """Values at the vertices of a grid of settings, and the curves on which they jump or bend.
 
     Attributes
@@ -69,7 +70,7 @@ class ActuatorMap(ABC):
 
     def _repr_html_(self) -> str:
         """Table of grid, values and statuses, for notebooks."""
-        box, units = self.grid.box, {each.name: each.unit for each in self.structure.parameters}
+        box, units = self.grid.box, units_of(self.structure.parameters)
         sides = zip(box.names, box.lower, box.upper, strict=True)
         rows = [[name, f"{low:g} to {high:g} {units[name]}"] for name, low, high in sides]
         rows.append(["load", f"{self.load} ({units[self.load]})"])
@@ -80,6 +81,42 @@ class ActuatorMap(ABC):
         rows.append(["curves", f"{len(self.curves)}"])
         shape = " × ".join(map(str, self.value.shape))
         return html_table(f"{type(self).__name__} of {shape} settings", [], rows)
+
+    @property
+    @abstractmethod
+    def unit(self) -> str:
+        """Unit of the values."""
+
+    @property
+    def table(self) -> Table:
+        """Values with their statuses, setting by setting."""
+        settings, _ = settings_of(self.grid)
+        columns = dict(zip(self.grid.names, settings.T, strict=True))
+        kinds = np.array(self.kinds)[self.status.ravel()]
+        return Table({**columns, "value": self.value.ravel(), "status": kinds}, self._units)
+
+    @property
+    def curve_table(self) -> Table:
+        """Points of the curves with the values on both sides.
+
+        "error" bounds that of the place along its grid line.
+        """
+        counts = [len(each.points) for each in self.curves]
+        numbers = np.repeat(np.arange(len(counts)), counts)
+        names = np.array([each.kind for each in self.curves], dtype=object)
+        points = np.concatenate([np.zeros((0, 2)), *(each.points for each in self.curves)])
+        values = np.concatenate([np.zeros((0, 2)), *(each.values for each in self.curves)])
+        errors = np.concatenate([np.zeros(0), *(each.errors for each in self.curves)])
+        columns = dict(zip(self.grid.names, points.T, strict=True))
+        sides = dict(zip(("lower", "higher"), values.T, strict=True))
+        numbered = {"curve": numbers, "kind": names[numbers]}
+        return Table({**numbered, **columns, **sides, "error": errors}, self._units)
+
+    @property
+    def _units(self) -> dict[str, str]:
+        units = units_of(self.structure.parameters)
+        values = dict.fromkeys(("value", "lower", "higher"), self.unit)
+        return {**{name: units[name] for name in self.grid.names}, **values}
 
     @property
     def counts(self) -> dict[str, int]:

@@ -72,6 +72,11 @@ class CurvatureMap(ActuatorMap):
     descriptor: Descriptor
 
     @property
+    def unit(self) -> str:
+        """Unit of the descriptor."""
+        return self.descriptor.unit
+
+    @property
     def snaps(self) -> Bool[np.ndarray, "rows columns"]:
         """Settings whose real loading would snap on the way."""
         return self.where("snaps")

@@ -66,6 +66,11 @@ class LimitLoadMap(ActuatorMap):
 
     kinds: ClassVar[tuple[str, ...]] = labels(RayStatus)
 
+    @property
+    def unit(self) -> str:
+        """Unit of the load."""
+        return self.structure.parameters[position(self.structure.parameters, self.load)].unit
+
     @check_arguments
     def at(self, **setting: float) -> LimitLoad:
         """Limit load at one setting of the box, with its path.

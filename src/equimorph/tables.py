@@ -1,0 +1,112 @@
+"""Tables with units: tidy frames for pandas, and rows for files of comma-separated values."""
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+import numpy as np
+from jaxtyping import Shaped
+
+from equimorph.optional_packages import load_package
+
+Column = Shaped[np.ndarray, " rows"] | Sequence[object]
+
+
+@dataclass(frozen=True)
+class Table:
+    """Columns of one length by name, with units.
+
+    Parameters
+    ----------
+    columns
+        Numbers or texts, one for each row; None and NaN are empty cells of files.
+    units
+        By the name of the column; the others are texts, or numbers without a unit.
+    """
+
+    columns: Mapping[str, Column]
+    units: Mapping[str, str] = field(default_factory=dict)
+
+    def rows(self) -> list[list[str]]:
+        """Texts of all cells, below the heads ``name (unit)``."""
+        heads = [heading(name, self.units.get(name, "")) for name in self.columns]
+        cells = [[_cell(each) for each in values] for values in self.columns.values()]
+        return [heads, *map(list, zip(*cells, strict=True))]
+
+    def frame(self) -> Any:
+        """A `pandas.DataFrame` of the columns, with the units by column in ``attrs["units"]``.
+
+        Raises
+        ------
+        MissingError
+            If pandas is not installed.
+        """
+        frame = load_package("pandas", "tables", "frame").DataFrame(dict(self.columns))
+        frame.attrs["units"] = {name: self.units.get(name, "") for name in self.columns}
+        return frame
+
+
+class Tabular(ABC):
+    """Results that are a table."""
+
+    @property
+    @abstractmethod
+    def table(self) -> Table:
+        """The table; see `frame`."""
+
+    def frame(self) -> Any:
+        """The table as a tidy `pandas.DataFrame`, with the units of its columns in ``attrs``.
+
+        Raises
+        ------
+        InputError
+            If pandas is not installed.
+
+        Examples
+        --------
+        ``eset.frame().query("index == 0")``, ``schedule.frame().attrs["units"]["time"]``
+        """
+        return self.table.frame()
+
+
+class Quantity(Protocol):
+    """Parameters, descriptors: what has a name and a unit."""
+
+    @property
+    def name(self) -> str:
+        """Its name."""
+
+    @property
+    def unit(self) -> str:
+        """Its unit."""
+
+
+def units_of(quantities: Iterable[Quantity]) -> dict[str, str]:
+    """Units by name."""
+    return {each.name: each.unit for each in quantities}
+
+
+def heading(name: str, unit: str) -> str:
+    """Head of a column; numbers without unit have none.
+
+    Examples
+    --------
+    >>> heading("theta_A", "rad"), heading("progress", "1")
+    ('theta_A (rad)', 'progress')
+    """
+    return f"{name} ({unit})" if unit not in ("", "1") else name
+
+
+def number_text(value: float) -> str:
+    """Return the shortest decimal that gives a number back exactly; nothing for no number."""
+    return repr(float(value)) if math.isfinite(value) else ""
+
+
+def _cell(value: object) -> str:
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, float):
+        return number_text(value)
+    return "" if value is None else str(value)
