@@ -106,7 +106,7 @@ def test_xarray_sees_the_numbers_of_any_answer(spring_set: EquilibriumSet, tmp_p
     """Plain fields are attributes; arrays have the dimensions that their annotations name."""
     angle = spring_set.structure.descriptor("angle")
     here = spring_set.at(x_l=0.8, F=0.0).stable
-    limit = limit_load(here[int(angle(here).argmin())], "F")
+    limit = limit_load(here[int(angle(here).argmax())], "F")
     answers = {"limit": {"one": limit}}
     path = write_results(tmp_path / "r.h5", spring_set, angle, answers=answers)
     with xarray.open_datatree(path) as tree:
