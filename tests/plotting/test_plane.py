@@ -8,7 +8,7 @@ from scipy.integrate import quad
 
 import equimorph as em
 from equimorph import plotting
-from equimorph.charts.regions import count_regions, empty_regions
+from equimorph.charts.regions import count_equilibria, count_regions, empty_regions
 from equimorph.errors import InputError
 from equimorph.plotting.labels import label_contours
 from equimorph.tasks.planning.smoothing import smoothed
@@ -41,15 +41,27 @@ def line_labelled(ax, label):
 
 def test_the_spring_has_three_equilibria_inside_the_cusp_and_one_outside(spring_set):
     """Area inside by quadrature. Chords between exact fold points, one per grid line, lose 1 %."""
-    areas = count_regions(spring_set.coordinates, spring_set.cells).areas()
+    areas = count_equilibria(spring_set).areas()
     inside = quad(lambda x: 2 * min(fold_load(x), 0.3), 0.3, 1.0, points=[0.41])[0]
     assert areas[3] == pytest.approx(inside, rel=0.02)
     assert sum(areas.values()) == pytest.approx(1.1 * 0.6, rel=1e-6)
     assert areas[2] == pytest.approx(0.0, abs=1e-6)
 
 
+@pytest.mark.parametrize("intervals", [(12, 12), (24, 24), (25, 16)])
+def test_regions_of_several_equilibria_end_at_the_cusp(intervals):
+    """The cusp lies at x_l = 1; cells that lie overturned next to it make no sliver beyond."""
+    box = em.Box(x_l=(0.4, 1.4), F=(-0.3, 0.3))
+    eset = em.equilibrium_set(em.Spring(), box, intervals=intervals, checks=0)
+    for stable_only, most in ((False, 3), (True, 2)):
+        regions = count_equilibria(eset, stable_only=stable_only)
+        assert regions.largest == most
+        ends = [loop[:, 0].max() for level in regions.levels[1:] for loop in level]
+        assert max(ends) == pytest.approx(1.0, abs=1e-6)
+
+
 def test_every_place_counts_as_many_equilibria_as_the_set_has_there(spring_set):
-    regions = count_regions(spring_set.coordinates, spring_set.cells)
+    regions = count_equilibria(spring_set)
     for x_l, force in ((0.5, 0.1), (0.7, -0.02), (0.9, 0.15), (1.2, -0.2)):
         expected = len(spring_set.at(x_l=x_l, F=force))
         assert regions.count(np.array([[x_l, force]])).tolist() == [expected]

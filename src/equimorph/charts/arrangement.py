@@ -25,10 +25,15 @@ ROUNDS = 12
 """Most rounds of cutting: every cut is rounded, which may make new crossings."""
 
 
-def outline(coordinates: OldPlaces, cells: Int[np.ndarray, "cells 3"]) -> tuple[Edges, Jumps]:
+def outline(
+    coordinates: OldPlaces,
+    cells: Int[np.ndarray, "cells 3"],
+    overturned: Bool[np.ndarray, " cells"] | None = None,
+) -> tuple[Edges, Jumps]:
     """Sum of the directed edges of all triangles, each of them turned counter-clockwise.
 
-    Edges between neighbours that lie side by side cancel. Flat triangles cover nothing.
+    Edges between neighbours that lie side by side cancel. Flat triangles cover nothing, overturned
+    ones cover minus one time.
 
     Returns
     -------
@@ -36,7 +41,8 @@ def outline(coordinates: OldPlaces, cells: Int[np.ndarray, "cells 3"]) -> tuple[
     """
     a, b, c = (coordinates[cells[:, k]] for k in range(3))
     turn = cross(b - a, c - a)
-    ordered = np.where(turn[:, None] > 0, cells, cells[:, ::-1])[turn != 0]
+    upright = turn > 0 if overturned is None else (turn > 0) != overturned
+    ordered = np.where(upright[:, None], cells, cells[:, ::-1])[turn != 0]
     edges = np.concatenate([ordered[:, [0, 1]], ordered[:, [1, 2]], ordered[:, [2, 0]]])
     return _merge(edges, np.ones(len(edges), int))
 

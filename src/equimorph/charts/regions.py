@@ -7,7 +7,9 @@ Projecting the cells of the set to the plane of parameters, the number of cells 
 a winding number: turn every projected cell counter-clockwise and add up its edges. Inside a sheet
 the contributions of neighbours cancel; what remains are the edges e on which the set folds over
 (jump j = ±2) or ends (±1). Cutting these edges at their crossings gives the exact regions
-of constant N, with no raster in between.
+of constant N, with no raster in between. Close to cusps a few cells lie overturned under their
+neighbours, because they are straight and the sheet is not: these count minus one time, so that
+only folds and ends of a sheet are edges of regions (N is the degree of the projection).
 
 See docs/decisions.md, "Charts are cells over coordinates".
 """
@@ -19,6 +21,8 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from equimorph.charts.arrangement import arrange, cross, outline, sides, winding, winding_raster
+from equimorph.manifold import EquilibriumSet
+from equimorph.manifold.geometry.topology import adjacency, senses
 
 Counts = Int[np.ndarray, " edges"]
 Flags = Bool[np.ndarray, " edges"]
@@ -86,7 +90,9 @@ class Regions:
 
 
 def count_regions(
-    coordinates: Float[np.ndarray, "vertices 2"], cells: Int[np.ndarray, "cells 3"]
+    coordinates: Float[np.ndarray, "vertices 2"],
+    cells: Int[np.ndarray, "cells 3"],
+    overturned: Bool[np.ndarray, " cells"] | None = None,
 ) -> Regions:
     """Exact regions of the plane by the number of projected cells that cover them.
 
@@ -98,12 +104,22 @@ def count_regions(
         Free parameters at every vertex of the set.
     cells
         Vertex numbers of the cells to count: all, or those of one index.
+    overturned
+        Which of them count minus one time; none if not given.
 
     Returns
     -------
     Nested regions; none at all if there is no cell.
     """
-    return regions_within(coordinates, *outline(coordinates, cells))
+    return regions_within(coordinates, *outline(coordinates, cells, overturned))
+
+
+def count_equilibria(eset: EquilibriumSet, *, stable_only: bool = False) -> Regions:
+    """Exact regions of the plane of two free parameters by the number of equilibria over them."""
+    whole = adjacency(eset.cells)
+    overturned = senses(eset.cells, eset.cell_index, eset.coordinates, whole).overturned
+    chosen = eset.cell_index == 0 if stable_only else np.ones(len(eset.cells), bool)
+    return count_regions(eset.coordinates, eset.cells[chosen], overturned[chosen])
 
 
 def empty_regions(

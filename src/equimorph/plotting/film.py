@@ -16,7 +16,7 @@ from PIL import Image
 
 from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Values
-from equimorph.charts.regions import count_regions
+from equimorph.charts.regions import count_equilibria
 from equimorph.equilibria import Path
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import position
@@ -136,7 +136,7 @@ class _Board:
             ax.set_ylabel(descriptor_label(structure.elevation))
             return
         frame_plane(ax, self.eset)
-        regions = count_regions(self.eset.coordinates, self.eset.cells)
+        regions = count_equilibria(self.eset)
         shade_regions(ax, self.eset, regions)
         hatch_cut(ax, self.eset, regions, stable_only=False)
         draw_folds(ax, self.eset)

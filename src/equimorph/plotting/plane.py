@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from equimorph.argument_checks import check_arguments
-from equimorph.charts.regions import count_regions
+from equimorph.charts.regions import count_equilibria
 from equimorph.equilibria import Path
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet, divided_by
@@ -117,9 +117,7 @@ def parameter_plane(
         if ax is None:
             height = _BOTTOM + _FRAME_HEIGHT + _TOP
             ax = style.new_axes(style.SINGLE_COLUMN, height, (_LEFT, _BOTTOM, _RIGHT, _TOP))
-        regions = count_regions(
-            eset.coordinates, eset.cells if count == "all" else eset.cells[eset.cell_index == 0]
-        )
+        regions = count_equilibria(eset, stable_only=count == "stable")
         frame_plane(ax, eset)
         largest = shade_regions(ax, eset, regions)
         lines = draw_folds(ax, eset, stable_only=count == "stable")

@@ -12,7 +12,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from equimorph.argument_checks import check_arguments
-from equimorph.charts.regions import count_regions
+from equimorph.charts.regions import count_equilibria
 from equimorph.errors import InputError
 from equimorph.manifold import Snap, SnapGraph
 from equimorph.model import Descriptor
@@ -94,7 +94,7 @@ def _draw_plane(ax: Axes, graph: SnapGraph, shades: ScalarMappable) -> list[Line
     """Draw stable states and where snaps begin; return entries for a legend."""
     eset = graph.eset
     frame_plane(ax, eset)
-    regions = count_regions(eset.coordinates, eset.cells[eset.cell_index == 0])
+    regions = count_equilibria(eset, stable_only=True)
     largest = shade_regions(ax, eset, regions)
     hatched = hatch_cut(ax, eset, regions, stable_only=True)
     lines = draw_folds(ax, eset, stable_only=True)
