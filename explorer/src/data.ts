@@ -15,7 +15,7 @@ export interface Obstacle { centre?: number[]; radius?: number; inside?: boolean
 
 export interface Words {
   title: string; kind: string; audit: string; clean: boolean; unit: string; upward: string;
-  space: 2 | 3; size: number; vertices: number; parameters: Parameter[];
+  space: 2 | 3; size: number; vertices: number; middles: number; parameters: Parameter[];
   fixed: { name: string; unit: string; value: number }[]; constraints: string[];
   obstacles: Obstacle[]; scalars: Scalar[]; elevation: string; layout: Part[]; fidelity: number;
   routes: Route[]; runs: Run[]; barriers: Barrier[]; rule: string;

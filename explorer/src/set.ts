@@ -1,5 +1,6 @@
 /** The equilibrium set: states in its cells, what lies over a point, and walks along its sheets. */
 
+import { Curves } from "./curves";
 import type { Arrays, Scalar, Words } from "./data";
 
 /** A point of a cell: its corners with their weights. Vertices count as cells of one corner. */
@@ -31,6 +32,7 @@ export class EquilibriumSet {
   readonly numbers: number;
   private neighbours: Int32Array | null = null;
   private facetKinds = new Map<string, "fold" | "branch point">();
+  private curves: Curves | null = null;
   private bins: { start: Int32Array; cells: Int32Array; counts: number[] } | null = null;
 
   constructor(readonly words: Words, readonly arrays: Arrays) {
@@ -68,11 +70,16 @@ export class EquilibriumSet {
     const { low, step } = this.words.scalars[number];
     return low + step * this.arrays[`scalar${number}`][state];
   }
-  scalar(number: number, spot: Spot): number { return this.mean(spot, (v) => this.scalarAt(number, v)); }
+  scalar(number: number, spot: Spot): number { return this.straight(number, this.shown(spot)); }
+  /** The same on the straight cell, as the sheet is drawn. */
+  straight(number: number, spot: Spot): number { return this.mean(spot, (v) => this.scalarAt(number, v)); }
   named(name: string): number { return this.words.scalars.findIndex((each: Scalar) => each.name === name); }
 
   indexOf(spot: Spot): number { return spot.cell >= 0 ? this.cellIndex[spot.cell] : this.index[spot.corners[0]]; }
   stratumOf(spot: Spot): number { return spot.cell >= 0 ? this.stratum[spot.cell] : -1; }
+
+  /** The state as it is shown, with its numbers: on the curved cell. */
+  shown(spot: Spot): Spot { return (this.curves ??= new Curves(this)).at(spot); }
 
   /** Coefficients of the picture of a state. */
   coefficients(spot: Spot): Float64Array {
@@ -85,7 +92,7 @@ export class EquilibriumSet {
 
   /** All numbers of the picture of a state; see `equimorph.explorer.pictures`. */
   picture(spot: Spot): Float64Array {
-    const { mean, modes } = this.arrays, c = this.coefficients(spot);
+    const { mean, modes } = this.arrays, c = this.coefficients(this.shown(spot));
     const out = Float64Array.from(mean);
     for (let j = 0; j < this.numbers; j++)
       for (let k = 0; k < this.modes; k++) out[j] += c[k] * modes[j * this.modes + k];
@@ -256,7 +263,7 @@ export class EquilibriumSet {
   }
 
   /** Change of the weights along a direction of the parameters. */
-  private rates(cell: number, direction: number[]): number[] | null {
+  rates(cell: number, direction: number[]): number[] | null {
     const v = this.corners(cell), d = this.d;
     const rows = Array.from({ length: d }, (_, a) =>
       [...Array.from({ length: d }, (_, k) => this.place(v[k + 1], a) - this.place(v[0], a)), direction[a]]);

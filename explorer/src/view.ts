@@ -60,7 +60,7 @@ export class View {
 
   /** Where a state is drawn. */
   position(spot: Spot): [number, number, number] {
-    return this.point(this.set.parameters(spot), this.set.scalar(this.height, spot));
+    return this.point(this.set.parameters(spot), this.set.straight(this.height, spot));
   }
 
   private point(p: number[], value: number): [number, number, number] {

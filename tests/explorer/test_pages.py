@@ -11,9 +11,11 @@ import numpy as np
 import pytest
 
 import equimorph as em
+from equimorph.explorer.curved_edges import curved_edges
 from equimorph.explorer.packing import json_in_html, pack, quantise
 from equimorph.explorer.pictures import FIDELITY, gallery
 from equimorph.explorer.study_text import study_text, toml
+from equimorph.manifold import edge_middles
 from equimorph.study.problem import parse_study
 from oracles.specimens import SPECIMENS
 
@@ -56,6 +58,17 @@ def test_quantised_values_are_within_half_a_step():
     whole, low, step = quantise(values)
     assert np.abs(low + step * whole - values).max() <= 0.5 * step * (1 + 1e-9)
     assert quantise(np.full(3, 2.0))[1:] == (2.0, 0.0)
+
+
+def test_middles_of_edges_are_exact_states(spring_set):
+    """F = k (1 − x_l/cos δ) sin δ; those that a page holds bend away from their edges."""
+    whole, kept = edge_middles(spring_set), curved_edges(spring_set)
+    assert len(np.unique(whole.ends, axis=0)) == len(whole.ends)
+    assert 0 < len(kept.ends) < 0.5 * len(whole.ends)
+    for each in (whole, kept):
+        angle = spring_set.structure.angle(each.states)
+        length, force = each.states["x_l"], each.states["F"]
+        assert (1.0 - length / np.cos(angle)) * np.sin(angle) == pytest.approx(force, abs=1e-9)
 
 
 def test_text_in_scripts_cannot_end_them():

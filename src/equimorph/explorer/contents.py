@@ -1,7 +1,8 @@
 """What a page holds: states with their pictures and numbers, cells, folds, snaps, routes, barriers.
 
-States of routes, landings of snaps and both sides of barriers stand behind the vertices of the set
-in one list, so that everything that the page shows is a state of that list or lies in a cell.
+States of routes, landings of snaps, both sides of barriers and middles of curved edges stand behind
+the vertices of the set in one list, so that everything that the page shows is a state of that list
+or lies in a cell.
 """
 
 from collections.abc import Mapping, Sequence
@@ -13,6 +14,7 @@ from jaxtyping import Int, Num
 
 from equimorph.charts import Reduction
 from equimorph.errors import InputError
+from equimorph.explorer.curved_edges import curved_edges
 from equimorph.explorer.packing import quantise
 from equimorph.explorer.pictures import gallery
 from equimorph.explorer.study_text import study_text
@@ -52,6 +54,8 @@ def contents(asked: Question) -> tuple[dict[str, Any], Arrays]:
     routes = [_route(eset, name, each, extra) for name, each in asked.routes.items()]
     runs, snap_arrays = _snaps(asked.snaps, extra)
     barriers = [] if asked.reduction is None else _barriers(asked.reduction, extra)
+    middles = curved_edges(eset)
+    first_middle = extra.add(middles.states)
     states = extra.all()
     shown = gallery(states)
     scalars, scalar_arrays = _scalars(states, _descriptors(asked))
@@ -67,6 +71,7 @@ def contents(asked: Question) -> tuple[dict[str, Any], Arrays]:
         "space": shown.space,
         "size": shown.size,
         "vertices": len(eset.points),
+        "middles": first_middle,
         "parameters": _parameters(eset),
         "fixed": _fixed(eset),
         "constraints": [_bound(each) for each in eset.constraints],
@@ -89,6 +94,7 @@ def contents(asked: Question) -> tuple[dict[str, Any], Arrays]:
         "index": np.minimum(_index(eset, states), 255).astype(np.uint8),
         "cells": eset.cells.astype(np.int32),
         "cell_index": np.minimum(eset.cell_index, 255).astype(np.uint8),
+        "bent": middles.ends.astype(np.int32),
         "stratum": eset.stratum.astype(np.int32),
         "component": eset.component.astype(np.int32),
         "folds": _facets(eset.folds, d),
@@ -164,6 +170,7 @@ def _descriptors(asked: Question) -> list[Descriptor]:
         if each.name in eset.names or each.role == "actuator"
     ]
     found += [effort_of(structure, name) for name in moved]
+    found += [each for each in structure.support_reactions if np.any(each(eset.points) != 0.0)]
     return list({each.name: each for each in found}.values())
 
 

@@ -140,11 +140,16 @@ def _project(centred: Pictures, modes: Rows) -> tuple[Coefficients, Values]:
     return found, np.abs(centred - found @ modes).max(axis=1)
 
 
+def size_of(states: States) -> float:
+    """Larger side of the box around a shape, the largest of a sample of the states."""
+    some = states[np.unique(np.linspace(0, len(states) - 1, _SAMPLE).astype(int))]
+    return float(np.ptp(some.shape(), axis=1).max()) or 1.0
+
+
 def _scales(states: States) -> Scales:
     """What lengths in pictures refer to, from a sample of the states."""
     some = states[np.unique(np.linspace(0, len(states) - 1, _SAMPLE).astype(int))]
-    shape, drawing = some.shape(), some.drawing()
-    size = float(np.ptp(shape, axis=1).max()) or 1.0
+    drawing = some.drawing()
     most = {
         distributed: max(
             (
@@ -158,7 +163,7 @@ def _scales(states: States) -> Scales:
     }
     couple = max((float(np.abs(each.moments).max(initial=0.0)) for each in drawing.couples),
                  default=0.0)  # fmt: skip
-    return Scales(size, most[True], most[False], couple)
+    return Scales(size_of(states), most[True], most[False], couple)
 
 
 def _picture(states: States, scales: Scales) -> tuple[Pictures, list[dict[str, Any]]]:

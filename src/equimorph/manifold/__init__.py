@@ -14,6 +14,7 @@ from equimorph.manifold.lookup.exact_states import lift_to
 from equimorph.manifold.lookup.states_over import StatesOver
 from equimorph.manifold.queries.components import Components, components
 from equimorph.manifold.queries.cusps import Cusps, cusps
+from equimorph.manifold.queries.edge_middles import EdgeMiddles, edge_middles
 from equimorph.manifold.queries.levels import (
     Division,
     Level,
@@ -39,6 +40,7 @@ __all__ = [
     "Components",
     "Cusps",
     "Division",
+    "EdgeMiddles",
     "EquilibriumSet",
     "Level",
     "Location",
@@ -54,6 +56,7 @@ __all__ = [
     "cusps",
     "divided",
     "divided_by",
+    "edge_middles",
     "equilibrium_set",
     "level_set",
     "lift_to",

@@ -297,6 +297,11 @@ class Structure(Equations):
         """Descriptor that is the height in figures of the set: the energy by default."""
         return self.total_energy
 
+    @property
+    def support_reactions(self) -> tuple[Descriptor, ...]:
+        """Descriptors of the forces and couples of its supports; none by default."""
+        return ()
+
     def symmetries(self) -> tuple[Symmetry, ...]:
         """Symmetries of the equilibrium set; none unless the structure says so."""
         return ()

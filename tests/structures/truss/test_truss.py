@@ -51,9 +51,13 @@ def test_a_tripod_shares_its_load_by_symmetry():
     bars = [(foot, "T") for foot in feet]
     truss = Truss({**feet, "T": (0, 0, 1)}, bars, held, {"F": {"T": (0, 0, -1)}})
     state = em.lift(truss.natural_state(), to={"F": 1e-6}).end.state
-    for foot in feet:
+    for foot, place in feet.items():
         force = truss.force(f"{foot}-T")(state) / 1e-6
         assert force == pytest.approx(-np.sqrt(2) / 3, rel=1e-5)
+        held = [truss.reaction(foot, axis)(state) / 1e-6 for axis in "xyz"]
+        inward = -np.array(place) / 3.0
+        assert held == pytest.approx([*inward[:2], 1.0 / 3.0], abs=1e-5)
+    assert len(truss.support_reactions) == 9
 
 
 @pytest.mark.parametrize("strain", ["engineering", "green"])
@@ -122,8 +126,8 @@ def test_descriptors_are_read_as_they_are_written():
     truss = arch_truss("engineering")
     state = em.lift(truss.natural_state(), to={"F": 0.02, "H": 0.01, "b": 0.02}).end.state
     for text in (
-        "force(A-B)", "utilisation(B-C)", "max_utilisation", "displacement(B,y)", "travel(F)",
-        "effort(a)", "energy",
+        "force(A-B)", "reaction(A,y)", "utilisation(B-C)", "max_utilisation", "displacement(B,y)",
+        "travel(F)", "effort(a)", "energy",
     ):  # fmt: skip
         assert truss.descriptor(text).name == text
     assert truss.descriptor("force( B - A )")(state) == truss.force("A-B")(state)

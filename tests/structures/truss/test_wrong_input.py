@@ -93,6 +93,8 @@ def test_stiffness_and_length_are_positive(name, value):
         ("displacement(D, x)", "`joint` must be one of A, B, C; got 'D'"),
         ("displacement(B, z)", "`axis` must be one of x, y; got 'z'"),
         ("displacement(A, x)", "`A.x` must be free to move; it is held by a support"),
+        ("reaction(B, y)", "`B.y` must be held by a support; it is free"),
+        ("reaction(A, z)", "`axis` must be one of x, y; got 'z'"),
         ("travel(G)", "`G` must be a parameter"),
     ],
 )

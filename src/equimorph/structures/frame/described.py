@@ -10,6 +10,7 @@ from equimorph.arrays import Lanes, Parameters, Values
 from equimorph.errors import InputError
 from equimorph.model import Descriptor
 from equimorph.structures.frame.fields import FrameFields
+from equimorph.structures.frame.member import AXES
 
 
 class DescribedFrame(FrameFields):
@@ -103,6 +104,13 @@ class DescribedFrame(FrameFields):
 
         quantity = "force·length" if along == 2 else "force"
         return self._make(f"reaction({joint},{axis})", quantity, value)
+
+    @property
+    def support_reactions(self) -> tuple[Descriptor, ...]:
+        """Reactions along all that supports hold or spring."""
+        network = self.model.network
+        held = np.argwhere(network.supports != 0.0).tolist()
+        return tuple(self.reaction(network.joints[at], AXES[along]) for at, along in held)
 
     def first_move(self) -> Descriptor:
         """The turn of the first joint that can, or the energy."""

@@ -100,6 +100,11 @@ class Described(Measured):
         label = self.units.label("couple")
         return Descriptor(f"end_moment({end})", label, value, f"M({end})", self.signature)
 
+    @property
+    def support_reactions(self) -> tuple[Descriptor, ...]:
+        """Both components of the force at A, and the couples at both ends."""
+        return (*map(self.support_force, "xy"), *map(self.end_moment, (0, 1)))
+
     def own_descriptor(self, name: str, argument: str | None) -> Descriptor | None:
         """Descriptor of a planar rod by its name and argument."""
         if name in ("lateral_index", "lateral_margin"):

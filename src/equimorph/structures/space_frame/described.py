@@ -124,6 +124,18 @@ class DescribedSpatialFrame(SpatialFrameFields):
 
         return self._make(f"reaction({joint},{axis})", "force", value)
 
+    @property
+    def support_reactions(self) -> tuple[Descriptor, ...]:
+        """Forces of all supports, and couples of those that hold a rotation."""
+        network = self.model.network
+        supports = list(zip(network.joints, network.supports, strict=True))
+        held = [joint for joint, each in supports if len(each.directions)]
+        turned = [joint for joint, each in supports if each.holds_rotation]
+        return (
+            *(self.reaction(joint, axis) for joint in held for axis in "xyz"),
+            *(self.couple(joint, axis) for joint in turned for axis in "xyz"),
+        )
+
     @check_arguments
     def couple(self, joint: str, axis: str) -> Descriptor:
         """Couple of a support that holds a rotation, about x, y or z."""

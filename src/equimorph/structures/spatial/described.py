@@ -176,6 +176,12 @@ class DescribedInSpace(AnyRod):
         name, label = f"end_couple({end}, {component})", self.units.label("couple")
         return Descriptor(name, label, value, f"M_{component}({end})", self.signature)
 
+    @property
+    def support_reactions(self) -> tuple[Descriptor, ...]:
+        """All components of the force at A and of the couples at both ends."""
+        couples = [self.end_couple(end, axis) for end in (0, 1) for axis in "xyz"]
+        return (*map(self.support_force, "xyz"), *couples)
+
     @check_arguments
     def warnings(self, state: State, thickness: float = 0.0) -> tuple[str, ...]:
         """Why what is computed of a state may not hold, one line each.

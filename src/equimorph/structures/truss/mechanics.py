@@ -92,13 +92,25 @@ class TrussMechanics(AnyNetwork):
         full = self.moves_of(u)
         return np.asarray(np.diff(full[:, self.network.ends], axis=2)[:, :, 0])
 
-    def _sum_at_joints(self, forces: Float[np.ndarray, "lanes bars space"]) -> Lanes:
+    def joint_forces(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes joints space"]:
+        """Forces that the joints need for balance with the bars: loads, or those of supports."""
+        spans, (squared, rest) = self.spans(z), self.lengths(z, p)
+        pull = self.energies.force(squared, rest) / np.sqrt(squared)
+        return self._all_joints(pull[:, :, None] * spans)
+
+    def _all_joints(
+        self, forces: Float[np.ndarray, "lanes bars space"]
+    ) -> Float[np.ndarray, "lanes joints space"]:
         """Sum at the joints what bars exert on their second joint, and take from their first."""
         full = np.zeros((len(forces), *self.network.held.shape))
         for bar, (first, second) in enumerate(self.network.ends.tolist()):
             full[:, second] += forces[:, bar]
             full[:, first] -= forces[:, bar]
-        return np.asarray(full[:, ~self.network.held])
+        return full
+
+    def _sum_at_joints(self, forces: Float[np.ndarray, "lanes bars space"]) -> Lanes:
+        """The same for the joints' moves that are free."""
+        return np.asarray(self._all_joints(forces)[:, ~self.network.held])
 
     @cached_property
     def _unknowns_of_bars(self) -> Int[np.ndarray, "bars both"]:

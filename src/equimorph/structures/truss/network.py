@@ -66,13 +66,23 @@ class TrussNetwork(Network):
 
     def move(self, joint: str, axis: str) -> int:
         """Number of the unknown of a joint along an axis."""
-        axes = AXES[: self.space]
-        if not (len(axis) == 1 and axis in axes):
-            raise InputError(f"`axis` must be one of {', '.join(axes)}; got {axis!r}.")
-        unknown = int(self.unknowns[self.joint(joint), axes.index(axis)])
+        unknown = int(self.unknowns[self.joint(joint), self._axis(axis)])
         if unknown < 0:
             raise InputError(f"`{joint}.{axis}` must be free to move; it is held by a support.")
         return unknown
+
+    def held_move(self, joint: str, axis: str) -> tuple[int, int]:
+        """Joint and axis that a support holds."""
+        at, along = self.joint(joint), self._axis(axis)
+        if not self.held[at, along]:
+            raise InputError(f"`{joint}.{axis}` must be held by a support; it is free.")
+        return at, along
+
+    def _axis(self, axis: str) -> int:
+        axes = AXES[: self.space]
+        if not (len(axis) == 1 and axis in axes):
+            raise InputError(f"`axis` must be one of {', '.join(axes)}; got {axis!r}.")
+        return axes.index(axis)
 
     def vector(
         self, forces: Mapping[str, Sequence[float]], what: str

@@ -20,7 +20,7 @@ from equimorph.structures.network import (
 )
 from equimorph.structures.truss.bar import BarSpec, Energies, Strain
 from equimorph.structures.truss.mechanics import COLLAPSED, BarValues, TrussMechanics, symmetries
-from equimorph.structures.truss.network import TrussNetwork, truss_network
+from equimorph.structures.truss.network import AXES, TrussNetwork, truss_network
 from equimorph.structures.unit_system import Quantity, Units, unit_system
 from equimorph.tolerances import SINGULAR
 
@@ -233,6 +233,7 @@ class Truss(TrussMechanics):
 
     written: ClassVar[Mapping[str, str]] = {
         "force(bar)": "force",
+        "reaction(joint, axis)": "reaction",
         "utilisation(bar)": "utilisation",
         "max_utilisation": "max_utilisation",
         "max_shortening": "max_shortening",
@@ -252,6 +253,22 @@ class Truss(TrussMechanics):
 
         name = self.network.members[at].name
         return self._make(f"force({name})", "force", value, f"N({name})")
+
+    @check_arguments
+    def reaction(self, joint: str, axis: str) -> Descriptor:
+        """Force of a support on its joint along an axis that it holds."""
+        at, along = self.network.held_move(joint, axis)
+
+        def value(z: Lanes, p: Parameters) -> Values:
+            return self.joint_forces(z, p)[:, at, along].copy()
+
+        return self._make(f"reaction({joint},{axis})", "force", value)
+
+    @property
+    def support_reactions(self) -> tuple[Descriptor, ...]:
+        """Forces of all supports along the axes that they hold."""
+        joints, held = self.network.joints, np.argwhere(self.network.held).tolist()
+        return tuple(self.reaction(joints[at], AXES[along]) for at, along in held)
 
     def _utilisations(self, z: Lanes, p: Parameters) -> BarValues:
         """Compression over the Euler load π² EI/l₀² [TimoshenkoGere1961]_; −∞ without EI."""
