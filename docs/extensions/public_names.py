@@ -65,9 +65,9 @@ def list_of(names: list[str]) -> str:
 
 
 def list_of_parts() -> str:
-    """Return the list of what draws, stores and reads: the exports of two modules."""
+    """Return the list of what draws, stores and reads: the exports of their modules."""
     rows = []
-    for module in (equimorph.plotting, equimorph.storage):
+    for module in (equimorph.plotting, equimorph.storage, equimorph.io):
         short = module.__name__.split(".")[1]
         rows += [
             f"| `em.{short}.{name}` | {first_line_of(getattr(module, name))} |"

@@ -12,6 +12,7 @@ from . import (
     equilibria as equilibria,
     errors as errors,
     explorer as explorer,
+    io as io,
     linalg as linalg,
     manifold as manifold,
     model as model,
