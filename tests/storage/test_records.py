@@ -1,7 +1,5 @@
 """Results of tasks, written field by field and read back."""
 
-from dataclasses import fields, is_dataclass
-
 import h5py
 import numpy as np
 import pytest
@@ -10,6 +8,7 @@ import equimorph as em
 from equimorph.storage.owner import Owner
 from equimorph.storage.values import read_value, write_value
 from equimorph.structures.quantities import find_descriptor
+from same_records import assert_equal
 
 
 @pytest.fixture(scope="module")
@@ -20,36 +19,6 @@ def spring():
 @pytest.fixture(scope="module")
 def eset(spring):
     return em.equilibrium_set(spring, em.Box(x_l=(0.5, 1.3), F=(-0.2, 0.2)), intervals=(9, 9))
-
-
-def assert_equal(one, other):
-    """Whether two records have the same fields, arrays bit for bit."""
-    assert type(one) is type(other)
-    if isinstance(one, em.State | em.States):
-        np.testing.assert_array_equal(one.z, other.z)
-        np.testing.assert_array_equal(one.p, other.p)
-    elif isinstance(one, em.Descriptor | em.Structure | str | None):
-        assert one == other
-    else:
-        parts, others = _parts(one), _parts(other)
-        if parts is None:
-            np.testing.assert_array_equal(one, other)
-        else:
-            for pair in zip(parts, others, strict=True):
-                assert_equal(*pair)
-
-
-def _parts(record):
-    """What a record consists of, or None."""
-    if is_dataclass(record):
-        return [
-            getattr(record, each.name)
-            for each in fields(record)
-            if each.metadata != em.model.NOT_KEPT
-        ]
-    if isinstance(record, dict):
-        return [*record, *record.values()]
-    return record if isinstance(record, tuple | list) else None
 
 
 def back(tmp_path, record, structure):

@@ -18,7 +18,7 @@ from equimorph.equilibria.trace import trace
 from equimorph.equilibria.trace_options import EventCode
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
-from equimorph.model import Box, Grid, parameter_vector, position
+from equimorph.model import Box, Grid, parameter_vector, position, remember_call
 from equimorph.structures import Structure
 
 MATCH = 1e-4
@@ -35,6 +35,7 @@ Ends = Callable[[Lanes, Parameters, Parameters], Lanes]
 """States at the ends of paths from unloaded states, their parameters, and those of the ends."""
 
 
+@remember_call
 @check_arguments
 def quasi_static(parameter: str) -> Rule:
     """Prefer the state that loading from the natural state reaches without any critical point.
@@ -51,6 +52,7 @@ def quasi_static(parameter: str) -> Rule:
     )
 
 
+@remember_call
 @check_arguments
 def first_stable_on_path(parameter: str, bound: float = BOUND) -> Rule:
     """Prefer the first stable state on the path from the natural state, through unstable parts too.

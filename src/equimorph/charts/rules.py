@@ -14,7 +14,7 @@ from equimorph.charts.location import Found
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.geometry.setting import embed
-from equimorph.model import Descriptor
+from equimorph.model import Descriptor, Rebuilt, remember_call
 from equimorph.structures import State, States
 from equimorph.tolerances import SAME_TO_ROUNDING
 
@@ -27,7 +27,7 @@ Scoring = Callable[[Found], Scores]
 Identity = Mapping[str, str | int | float]
 
 
-class Rule(ABC):
+class Rule(Rebuilt, ABC):
     """A way to prefer at most one of the states over each point."""
 
     identity: Identity | None
@@ -100,6 +100,7 @@ def _least(word: str, descriptor: Descriptor, sign: float) -> Rule:
     )
 
 
+@remember_call
 @check_arguments
 def lowest(descriptor: Descriptor) -> Rule:
     """Prefer the lowest value of a descriptor, like the energy.
@@ -112,6 +113,7 @@ def lowest(descriptor: Descriptor) -> Rule:
     return _least("lowest", descriptor, 1.0)
 
 
+@remember_call
 @check_arguments
 def highest(descriptor: Descriptor) -> Rule:
     """Prefer the highest value of a descriptor.
@@ -124,6 +126,7 @@ def highest(descriptor: Descriptor) -> Rule:
     return _least("highest", descriptor, -1.0)
 
 
+@remember_call
 @check_arguments
 def nearest(to: State | int) -> Rule:
     """Prefer the state nearest, in the metric, to a given state or stratum of the set.
@@ -152,6 +155,7 @@ def nearest(to: State | int) -> Rule:
     return _Least(f"nearest to stratum {to}", lambda eset: _distance_from(eset, to), identity)
 
 
+@remember_call
 def by_score(function: Callable[[States], Scores]) -> Rule:
     """Prefer the least value of a function of states."""
     return _Least("by score", lambda _: lambda found: np.asarray(function(found.states), float))

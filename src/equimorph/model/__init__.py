@@ -40,6 +40,7 @@ from equimorph.model.parameter import (
     parameter_vector,
     position,
 )
+from equimorph.model.rebuilding import Call, Rebuilt, remember_call
 from equimorph.model.schedule import Rates, Schedule
 from equimorph.model.spline import Spline
 
@@ -48,6 +49,7 @@ __all__ = [
     "Actuator",
     "ActuatorKind",
     "Box",
+    "Call",
     "Constraint",
     "Couples",
     "Descriptor",
@@ -62,6 +64,7 @@ __all__ = [
     "Parameter",
     "Progress",
     "Rates",
+    "Rebuilt",
     "Role",
     "Schedule",
     "Silent",
@@ -79,6 +82,7 @@ __all__ = [
     "parameter_vector",
     "position",
     "recalled",
+    "remember_call",
     "worst_excess",
     "worst_relative_excess",
 ]

@@ -15,6 +15,7 @@ from equimorph.argument_vocabulary import LARGEST
 from equimorph.arrays import Flags, Lanes, Parameters, Values
 from equimorph.errors import InputError
 from equimorph.model.obstacle import Obstacle
+from equimorph.model.rebuilding import Rebuilt, remember_call
 from equimorph.model.units import in_unit
 
 Evaluate = Callable[
@@ -80,7 +81,7 @@ class Vanishing:
 
 @check_arguments
 @dataclass(frozen=True, eq=False)
-class Descriptor:
+class Descriptor(Rebuilt):
     """A scalar of a state, with its name, unit and symbol for axes.
 
     Call it on a state for a float, on a batch of states for an array; compare it with a number for
@@ -174,6 +175,7 @@ class Descriptor:
         """Return the constraint that the descriptor stays at or above `bound`."""
         return Constraint(self, ">=", _number(self.name, bound, self.unit))
 
+    @remember_call
     def __abs__(self) -> "Descriptor":
         """Return its absolute value, whose minima at zero are kinks."""
 
@@ -277,6 +279,7 @@ def are_feasible(
     return good
 
 
+@remember_call
 @check_arguments
 def combined(
     name: str, function: Callable[..., Any], *descriptors: Descriptor, unit: str = "1"
@@ -311,6 +314,7 @@ def combined(
     return Descriptor(name, unit, value, name)
 
 
+@remember_call
 @check_arguments
 def largest_of(name: str, *descriptors: Descriptor) -> Descriptor:
     """Largest of several smooth descriptors; its minima, kinks among them, can be found exactly.

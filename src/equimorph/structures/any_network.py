@@ -11,7 +11,7 @@ from jaxtyping import Float
 from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Lanes, Parameters, Values
 from equimorph.errors import InputError
-from equimorph.model import Descriptor, Parameter, position
+from equimorph.model import Descriptor, Parameter, position, remember_call
 from equimorph.model.parameter import Role
 from equimorph.structures.contract import Symmetry
 from equimorph.structures.discrete import DiscreteStructure
@@ -128,6 +128,7 @@ class AnyNetwork(DiscreteStructure):
         return axes.index(given)
 
     @check_arguments
+    @remember_call
     def displacement(self, joint: str, axis: str) -> Descriptor:
         """Move of a joint along an axis, from where it is drawn."""
         at, along, unit = self.network.joint(joint), self.axis(axis), self.displacement_unit
@@ -142,6 +143,7 @@ class AnyNetwork(DiscreteStructure):
         return effort_of(self, parameter)
 
     @check_arguments
+    @remember_call
     def travel(self, load: str) -> Descriptor:
         """Displacement along a load, work per unit of its parameter."""
         if self.parameters[position(self.parameters, load)].role != "load":

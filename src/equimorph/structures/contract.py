@@ -9,7 +9,7 @@ from abc import abstractmethod
 from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -19,12 +19,15 @@ from equimorph.arrays import Flags, Lanes, Parameters, Values
 from equimorph.errors import InputError, MissingError, suggestion
 from equimorph.html_tables import html_table
 from equimorph.model import (
+    Call,
     Constraint,
     Descriptor,
     Drawing,
     Parameter,
+    Rebuilt,
     names_of,
     parameter_vector,
+    remember_call,
 )
 from equimorph.structures.approach import straight_arcs
 from equimorph.structures.equations import Equations
@@ -68,7 +71,7 @@ class Growth:
     promised: bool = False
 
 
-class Structure(Equations):
+class Structure(Rebuilt, Equations):
     """A structure with energy E(u; p), constraints c(u; p) = 0 and L = E + λ·c.
 
     All methods take and return batches, lanes first. F = (∂L/∂u, c), with the derivatives and
@@ -77,6 +80,7 @@ class Structure(Equations):
     `equimorph.structures.KINDS`.
     """
 
+    _call: Call
     kind: ClassVar[str]
     parameters: tuple[Parameter, ...]
     length_unit: str = "1"
@@ -109,6 +113,22 @@ class Structure(Equations):
     @abstractmethod
     def identity(self) -> dict[str, Any]:
         """Return the kind, and the arguments of the constructor as plain data, by their names."""
+
+    def __new__(cls, *arguments: Any, **named: Any) -> Self:
+        """Keep the call, for what the identity cannot hold: functions."""
+        made = super().__new__(cls)
+        made._call = Call(cls, arguments, named)
+        return made
+
+    @property
+    def origin_call(self) -> Call:
+        """The constructor with the identity, or as it was called if functions were given."""
+        try:
+            data = self.identity()
+        except InputError:
+            return self._call
+        data.pop("kind")
+        return Call(type(self), (), data)
 
     @cached_property
     def signature(self) -> Hashable:
@@ -284,6 +304,7 @@ class Structure(Equations):
         )
 
     @property
+    @remember_call
     def total_energy(self) -> Descriptor:
         """Potential energy with that of the loads: `energy` times `energy_scale`."""
 

@@ -12,7 +12,7 @@ import numpy as np
 from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Lanes, Parameters, Values
 from equimorph.errors import InputError
-from equimorph.model import Box, Descriptor, position
+from equimorph.model import Box, Descriptor, position, remember_call
 from equimorph.model.obstacle import Disc, HalfPlane, Obstacle
 from equimorph.model.units import FORCE, LENGTH, UNITS
 from equimorph.structures.approach import nearest
@@ -29,6 +29,7 @@ EFFORTS = {
 """Symbols of efforts by unit: couples M and forces F."""
 
 
+@remember_call
 @check_arguments
 def value_of(structure: Structure, name: str) -> Descriptor:
     """Value of a parameter, to bound an actuator: ``value_of(arch, "Theta") <= 2``.
@@ -46,6 +47,7 @@ def value_of(structure: Structure, name: str) -> Descriptor:
     return Descriptor(name, structure.parameters[at].unit, value, name, structure.signature)
 
 
+@remember_call
 @check_arguments
 def shape_coordinate(structure: Structure, axis: str, s: float) -> Descriptor:
     """Coordinate of the drawn shape at a share of its points: ``shape_coordinate(arch, "y", 0.3)``.
@@ -68,6 +70,7 @@ def shape_coordinate(structure: Structure, axis: str, s: float) -> Descriptor:
     return Descriptor(f"shape_{axis}({s:g})", structure.length_unit, value, "", structure.signature)
 
 
+@remember_call
 @check_arguments
 def effort_of(structure: Structure, name: str) -> Descriptor:
     """Effort ∂L/∂p of a parameter: the couple or force of an actuator, the displacement of a load.
@@ -87,6 +90,7 @@ def effort_of(structure: Structure, name: str) -> Descriptor:
     return Descriptor(f"effort({name})", label, value, symbol, structure.signature)
 
 
+@remember_call
 @check_arguments
 def margin_of(structure: Structure) -> Descriptor:
     """Stability margin: smallest eigenvalue of the constrained Hessian in the metric."""
@@ -97,6 +101,7 @@ def margin_of(structure: Structure) -> Descriptor:
     return Descriptor("stability_margin", "1", value, "margin", structure.signature)
 
 
+@remember_call
 @check_arguments
 def distance_to(structure: Structure, obstacle: Obstacle) -> Descriptor:
     """Signed distance of the shape from an obstacle: negative where it enters what is forbidden.
@@ -132,6 +137,7 @@ def distance_to(structure: Structure, obstacle: Obstacle) -> Descriptor:
     return Descriptor(name, unit, value, "distance", origin, place, obstacle=obstacle)
 
 
+@remember_call
 @check_arguments
 def outside(structure: Structure, box: Box) -> Descriptor:
     """Distance of parameters from a box, in their scales; negative inside.

@@ -17,6 +17,7 @@ from equimorph.model import (
     Parameter,
     Support,
     SupportKind,
+    remember_call,
 )
 from equimorph.structures.contract import Structure, Symmetry
 from equimorph.structures.equations import AnyBorder, Direction, Majorant, Shift
@@ -242,11 +243,13 @@ class Spring(Structure):
     energy_unit = "force·length"
 
     @cached_property
+    @remember_call
     def angle(self) -> Descriptor:
         """δ in radians."""
         return Descriptor("angle", "rad", lambda z, p: z[:, 0].copy(), "δ", self.signature)
 
     @cached_property
+    @remember_call
     def height(self) -> Descriptor:
         """Height of B in natural lengths."""
 

@@ -12,7 +12,7 @@ from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Flags, Lanes, Parameters, Values
 from equimorph.errors import InputError
 from equimorph.linalg.sparse import SparseLayout
-from equimorph.model import Constraint, Descriptor, Drawing, position
+from equimorph.model import Constraint, Descriptor, Drawing, position, remember_call
 from equimorph.structures.contract import Growth
 from equimorph.structures.discrete import DiscreteStructure, along_corners
 from equimorph.structures.energy.declared import (
@@ -363,6 +363,7 @@ class EnergyStructure(DiscreteStructure):
         return self.descriptor(next(iter((*self._given.descriptors, self._unknowns[0].name))))
 
     @check_arguments
+    @remember_call
     def descriptor(self, text: str) -> Descriptor:
         """Return the descriptor written as its name, or as ``effort(name)`` of a parameter."""
         name = text.replace(" ", "")

@@ -12,7 +12,16 @@ from numpy.polynomial import legendre
 from equimorph.arrays import Lanes, Parameters, Values
 from equimorph.errors import InputError
 from equimorph.linalg.sparse import SparseLayout
-from equimorph.model import Actuator, ActuatorKind, Couples, Descriptor, Drawing, Forces, Support
+from equimorph.model import (
+    Actuator,
+    ActuatorKind,
+    Couples,
+    Descriptor,
+    Drawing,
+    Forces,
+    Support,
+    remember_call,
+)
 from equimorph.structures.any_network import AnyNetwork
 from equimorph.structures.frame.any_model import AnyFrameModel
 from equimorph.structures.network import direction_of_mechanism
@@ -330,10 +339,12 @@ class AnyFrame(AnyNetwork):
     # --- descriptors ----------------------------------------------------------------------------
 
     @property
+    @remember_call
     def max_curvature(self) -> Descriptor:
         """Largest bending curvature in all members."""
         return self._curvature("max_curvature", "max |κ|", slice(None))
 
+    @remember_call
     def member_curvature(self, member: str) -> Descriptor:
         """Largest bending curvature in a member."""
         pieces = [at for at, _ in self.model.network.pieces_of(member)]

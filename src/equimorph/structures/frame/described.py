@@ -8,7 +8,7 @@ import numpy as np
 from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Lanes, Parameters, Values
 from equimorph.errors import InputError
-from equimorph.model import Descriptor
+from equimorph.model import Descriptor, remember_call
 from equimorph.structures.frame.fields import FrameFields
 from equimorph.structures.frame.member import AXES
 
@@ -32,6 +32,7 @@ class DescribedFrame(FrameFields):
     }
 
     @check_arguments
+    @remember_call
     def rotation(self, where: str, joint: str | None = None) -> Descriptor:
         """Turn of a joint, or of the end of a member there, in radians."""
         made, model = self.model.network, self.model
@@ -66,6 +67,7 @@ class DescribedFrame(FrameFields):
         """
         return self._end_force("shear", member, joint)
 
+    @remember_call
     def _end_force(self, kind: str, member: str, joint: str) -> Descriptor:
         model = self.model
         at, side = model.network.end(member, joint)
@@ -82,6 +84,7 @@ class DescribedFrame(FrameFields):
         return self._make(f"{kind}({model.network.edge_names[at]},{joint})", "force", value)
 
     @check_arguments
+    @remember_call
     def moment(self, member: str, joint: str) -> Descriptor:
         """Bending moment in a member at a joint, positive where it bends to its left."""
         at, side = self.model.network.end(member, joint)
@@ -93,6 +96,7 @@ class DescribedFrame(FrameFields):
         return self._make(name, "force·length", value)
 
     @check_arguments
+    @remember_call
     def reaction(self, joint: str, axis: str) -> Descriptor:
         """Force (axis "x" or "y"), or couple ("angle"), of a support on its joint."""
         at, along = self.model.network.support_place(joint, axis)

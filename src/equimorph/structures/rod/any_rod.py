@@ -14,7 +14,7 @@ from equimorph.argument_vocabulary import SHARE
 from equimorph.arrays import Flags, Lanes, Parameters, Sides, Values
 from equimorph.errors import InputError, suggestion
 from equimorph.linalg import BorderedSolution
-from equimorph.model import Descriptor
+from equimorph.model import Descriptor, remember_call
 from equimorph.structures.approach import smooth_arcs
 from equimorph.structures.contract import Symmetry
 from equimorph.structures.equations import (
@@ -274,6 +274,7 @@ class AnyRod(HeavyRod):
         """y(s), in units of L."""
         return self.coordinate(1, s)
 
+    @remember_call
     def coordinate(self, axis: int, s: float) -> Descriptor:
         """x(s), y(s) or z(s) (axis 0, 1, 2), in units of L."""
 
@@ -320,6 +321,7 @@ class AnyRod(HeavyRod):
     def support_force(self, component: str) -> Descriptor:
         """Component of the force of the support at A on the rod."""
 
+    @remember_call
     def support_force_along(self, axis: int, component: str) -> Descriptor:
         """Component of the force of the support at A along an axis."""
         unit = self.units.value("force")
@@ -331,6 +333,7 @@ class AnyRod(HeavyRod):
         return Descriptor(name, label, value, "λμν"[axis], self.signature)
 
     @check_arguments
+    @remember_call
     def clearance(self, apart: float = 0.1) -> Descriptor:
         """Smallest distance between points whose arclengths differ by `apart` at least.
 

@@ -10,7 +10,7 @@ from jaxtyping import Int
 from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Lanes, Parameters, Values
 from equimorph.errors import InputError, MissingError
-from equimorph.model import Constraint, Descriptor
+from equimorph.model import Constraint, Descriptor, remember_call
 from equimorph.structures.rod import space
 from equimorph.structures.rod.any_rod import COORDINATES, Field, Peaks, read_fraction
 from equimorph.structures.rod.ends import End
@@ -54,11 +54,13 @@ class Described(Measured):
         return self.coordinate(0, s), self.coordinate(1, s)
 
     @check_arguments
+    @remember_call
     def angle(self, s: float) -> Descriptor:
         """θ(s) in radians."""
         return self.field_at(s, "angle", "θ", "angle", self._field(0))
 
     @check_arguments
+    @remember_call
     def curvature(self, s: float) -> Descriptor:
         """κ(s) in units of 1/L."""
         return self.field_at(s, "curvature", "κ", "curvature", self._field(1))
@@ -68,6 +70,7 @@ class Described(Measured):
         return lambda z, p, at: self.fields(z, p, at)[:, 0, which]
 
     @cached_property
+    @remember_call
     def max_curvature(self) -> Descriptor:
         """max_s |κ(s)| in units of 1/L, ends and interior extrema included."""
         return self.max_curvature_descriptor(self._peaks)
@@ -88,6 +91,7 @@ class Described(Measured):
         return self.support_force_along(FORCES[component], component)
 
     @check_arguments
+    @remember_call
     def end_moment(self, end: int) -> Descriptor:
         """Couple of the actuator at end 0 or 1: ∂L/∂θ(end), in units of 4π²B/L."""
         if end not in (0, 1):
@@ -163,6 +167,7 @@ class Described(Measured):
         return OutOfPlane(self.mechanics, self.lagrangian, Holding.of(self.ends), stiffness)
 
     @check_arguments
+    @remember_call
     def lateral_index(self, torsion: Any = None, lateral: Any = None) -> Descriptor:
         """Number of independent movements out of the plane that lower the energy.
 
@@ -172,6 +177,7 @@ class Described(Measured):
         return space.lateral_index(self, block, written)
 
     @check_arguments
+    @remember_call
     def lateral_margin(self, torsion: Any = None, lateral: Any = None) -> Descriptor:
         """Smallest eigenvalue of the second variation for movements out of the plane.
 

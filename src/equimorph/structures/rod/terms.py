@@ -11,6 +11,7 @@ from jaxtyping import Float
 from equimorph.argument_checks import check_arguments
 from equimorph.argument_notes import LOAD_DIRECTION
 from equimorph.errors import InputError
+from equimorph.model import Rebuilt
 from equimorph.structures.rod.discretisation import Mesh
 from equimorph.structures.rod.profiles import (
     LoadShape,
@@ -66,7 +67,7 @@ class Effects:
     torsion: ElementNodes | float = 0.0
 
 
-class Term(ABC):
+class Term(Rebuilt, ABC):
     """Something that acts on a rod in proportion to a parameter."""
 
     word: ClassVar[str]

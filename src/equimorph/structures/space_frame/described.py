@@ -8,7 +8,7 @@ import numpy as np
 from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Lanes, Parameters, Values
 from equimorph.errors import InputError
-from equimorph.model import Descriptor
+from equimorph.model import Descriptor, remember_call
 from equimorph.structures.space_frame.fields import SpatialFrameFields
 
 SECTION = ("t", "n", "b")
@@ -34,6 +34,7 @@ class DescribedSpatialFrame(SpatialFrameFields):
     }
 
     @check_arguments
+    @remember_call
     def place(self, joint: str, axis: str) -> Descriptor:
         """Coordinate x, y or z of a joint."""
         moved, made = self.displacement(joint, axis), self.model.network
@@ -45,6 +46,7 @@ class DescribedSpatialFrame(SpatialFrameFields):
         return self._make(f"place({joint},{axis})", "length", value, f"{axis}({joint})")
 
     @check_arguments
+    @remember_call
     def rotation(self, joint: str, axis: str) -> Descriptor:
         """Component of the rotation vector of a joint, in radians; its size is at most π."""
         made, along = self.model.network, self.axis(axis)
@@ -61,6 +63,7 @@ class DescribedSpatialFrame(SpatialFrameFields):
         return self._make(f"rotation({joint},{axis})", "rad", value)
 
     @check_arguments
+    @remember_call
     def hinge(self, member: str, joint: str) -> Descriptor:
         """Angle of the hinge of a member at a joint, in radians, 0 as drawn."""
         made = self.model.network
@@ -93,6 +96,7 @@ class DescribedSpatialFrame(SpatialFrameFields):
         """Moment in a member at a joint about its tangent "t", normal "n" or binormal "b"."""
         return self._at_end("moment", member, joint, axis)
 
+    @remember_call
     def _at_end(self, kind: str, member: str, joint: str, axis: str) -> Descriptor:
         made, mesh = self.model.network, self.model.mesh
         at, side = made.end(member, joint)
@@ -113,6 +117,7 @@ class DescribedSpatialFrame(SpatialFrameFields):
         return self._make(name, "force" if kind == "force" else "force·length", value)
 
     @check_arguments
+    @remember_call
     def reaction(self, joint: str, axis: str) -> Descriptor:
         """Force of a support on its joint along x, y or z."""
         at, along = self.model.network.joint(joint), self.axis(axis)
@@ -137,6 +142,7 @@ class DescribedSpatialFrame(SpatialFrameFields):
         )
 
     @check_arguments
+    @remember_call
     def couple(self, joint: str, axis: str) -> Descriptor:
         """Couple of a support that holds a rotation, about x, y or z."""
         at, along = self.model.network.joint(joint), self.axis(axis)

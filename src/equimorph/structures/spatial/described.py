@@ -9,7 +9,7 @@ from jaxtyping import Float
 from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Lanes, Parameters, Values
 from equimorph.errors import InputError
-from equimorph.model import Descriptor
+from equimorph.model import Descriptor, remember_call
 from equimorph.structures.places_inertia import inertia_of_places
 from equimorph.structures.rod.any_rod import (
     COORDINATES,
@@ -116,6 +116,7 @@ class DescribedInSpace(AnyRod):
         turn, tilt, roll = (self._angle(name, s) for name in ANGLES)
         return turn, tilt, roll
 
+    @remember_call
     def _angle(self, name: str, s: float) -> Descriptor:
         def value(z: Lanes, p: Parameters, at: Arclengths) -> Values:
             r = self.frames(z, p, at)[:, 0]
@@ -133,12 +134,14 @@ class DescribedInSpace(AnyRod):
         twist, aside, bend = (self._strain(name, s) for name in STRAINS)
         return twist, aside, bend
 
+    @remember_call
     def _strain(self, name: str, s: float) -> Descriptor:
         axis = tuple(STRAINS).index(name)
         field: Field = lambda z, p, at: self.fields(z, p, at).strains[:, 0, axis]  # noqa: E731
         return self.field_at(s, name, STRAINS[name], "curvature", field)
 
     @check_arguments
+    @remember_call
     def bending(self, s: float) -> Descriptor:
         """Bending curvature √(κ_n² + κ_b²) at s, in units of 1/L."""
 
@@ -149,6 +152,7 @@ class DescribedInSpace(AnyRod):
         return self.field_at(s, "bending", "|κ|", "curvature", size)
 
     @cached_property
+    @remember_call
     def max_curvature(self) -> Descriptor:
         """Largest bending curvature along the rod, in units of 1/L."""
         return self.max_curvature_descriptor()
@@ -162,6 +166,7 @@ class DescribedInSpace(AnyRod):
         return self.support_force_along(axis, "xyz"[axis])
 
     @check_arguments
+    @remember_call
     def end_couple(self, end: int, component: str) -> Descriptor:
         """Couple of the support at end 0 or 1 on the rod, about an axis "x", "y" or "z"."""
         if end not in (0, 1):

@@ -10,7 +10,7 @@ from jaxtyping import Float
 from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Lanes, Parameters, Values
 from equimorph.errors import InputError
-from equimorph.model import Constraint, Descriptor
+from equimorph.model import Constraint, Descriptor, remember_call
 from equimorph.structures.contract import Product, Symmetry
 from equimorph.structures.discrete import correct_at_parameters
 from equimorph.structures.network import (
@@ -244,6 +244,7 @@ class Truss(TrussMechanics):
     }
 
     @check_arguments
+    @remember_call
     def force(self, bar: str) -> Descriptor:
         """Force in a bar, positive in tension."""
         at = self.network.bar(bar)
@@ -278,6 +279,7 @@ class Truss(TrussMechanics):
         return np.where(np.isnan(given), -np.inf, share)
 
     @check_arguments
+    @remember_call
     def utilisation(self, bar: str) -> Descriptor:
         """Compression of a bar over its Euler load π² EI/l₀²."""
         at = self.network.bar(bar)
@@ -291,6 +293,7 @@ class Truss(TrussMechanics):
         return self._make(f"utilisation({name})", "1", value, f"U({name})")
 
     @property
+    @remember_call
     def max_utilisation(self) -> Descriptor:
         """Largest utilisation of the bars that have a bending stiffness."""
         if all(bar.EI is None for bar in self.network.members):
@@ -304,6 +307,7 @@ class Truss(TrussMechanics):
         return self._make("max_utilisation", "1", value, "max U")
 
     @property
+    @remember_call
     def max_shortening(self) -> Descriptor:
         """Largest shortening of a bar relative to its rest length, 1 − l/l₀."""
 

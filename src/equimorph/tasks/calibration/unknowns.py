@@ -10,7 +10,7 @@ from jaxtyping import Float
 from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Parameters
 from equimorph.errors import InputError
-from equimorph.model import position
+from equimorph.model import Rebuilt, position
 from equimorph.structures import States, Structure
 
 Kind = Literal["value", "offset", "gain", "data"]
@@ -20,7 +20,7 @@ Vector = Float[np.ndarray, " k"]
 
 @check_arguments
 @dataclass(frozen=True, eq=False)
-class Family:
+class Family(Rebuilt):
     """Structures that differ in data which are no parameters: a stiffness, a length, a rise.
 
     Parameters

@@ -12,7 +12,7 @@ from equimorph.equilibria.sensitivity import steering
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.queries.locate import cell_of
-from equimorph.model import Constraint, Descriptor, Schedule, position
+from equimorph.model import Constraint, Descriptor, Schedule, position, remember_call
 from equimorph.structures import State, States, Structure
 from equimorph.tasks.motion.tracking import Tracking, track
 from equimorph.tasks.planning.planner import plan
@@ -107,6 +107,7 @@ def _check(home: Region, targets: Mapping[Descriptor, float]) -> None:
         )
 
 
+@remember_call
 def jacobian_of(
     structure: Structure, names: Sequence[str], descriptors: Sequence[Descriptor]
 ) -> Descriptor:
