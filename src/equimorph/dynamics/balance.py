@@ -14,6 +14,11 @@ CONVERGED = 1e-10
 """Largest Newton step, in radians and lengths of the structure, that counts as none."""
 LARGEST_STEP = 0.5
 """Largest change in one Newton step."""
+CONTRACTION = 0.25
+"""Largest ratio of the second Newton step to the first with which a guess is taken to lie on the
+same branch (Deuflhard, Newton Methods for Nonlinear Problems, 2004, §5.1)."""
+NEAR = 1e-3
+"""First Newton step, in radians and lengths of the structure, that need not contract."""
 NARROWEST = 1e-7
 """Shortest step in time, relative to the whole, with which equilibria are followed to a fold."""
 FOLD_STEPS = 8
@@ -66,9 +71,15 @@ class Balance:
         return float(eigh(stiff, mass, eigvals_only=True, subset_by_index=(0, 0))[0])
 
 
-def balance(linkage: Linkage, v: Vector, multipliers: Pulls, y: Settings) -> Balance | None:
-    """Equilibrium near a guess, by Newton's method; None if it does not converge."""
+def balance(
+    linkage: Linkage, v: Vector, multipliers: Pulls, y: Settings, contraction: float = np.inf
+) -> Balance | None:
+    """Equilibrium near a guess, by Newton's method.
+
+    None if it does not converge, or if its second step is more than `contraction` times the first.
+    """
     unknown = linkage.unknown
+    steps: list[float] = []
     v, multipliers = linkage.prescribe(v, y), multipliers.copy()
     for _ in range(NEWTON_STEPS):
         residual = linkage.residual(v, multipliers, y)[unknown]
@@ -81,6 +92,9 @@ def balance(linkage: Linkage, v: Vector, multipliers: Pulls, y: Settings) -> Bal
             return None
         free = int(linkage.free.sum())
         largest = float(np.abs(step[:free]).max())
+        steps.append(largest)
+        if len(steps) == 2 and steps[0] > NEAR and steps[1] > contraction * steps[0]:
+            return None
         step *= min(1.0, LARGEST_STEP / max(largest, 1e-300))
         v[linkage.free] += step[:free]
         multipliers += step[free:]
@@ -132,7 +146,7 @@ def _next(
         share = (aim - at) / (at - before[1])
         v = v + share * (v - before[0].v)
         multipliers = multipliers + share * (multipliers - before[0].multipliers)
-    new = balance(here.linkage, v, multipliers, course(aim))
+    new = balance(here.linkage, v, multipliers, course(aim), CONTRACTION)
     if new is None:
         return None
     moved = np.abs(new.v - here.v).max()

@@ -17,7 +17,7 @@ from equimorph.structures import State, States
 class LinkageModel(Model):
     """Chains of links, simulated by MuJoCo."""
 
-    independent = True
+    simulator = "mujoco"
 
     def __init__(self, chained: Chained) -> None:
         self._chained, self.linkage = chained, chained.linkage

@@ -76,8 +76,8 @@ class Model(ABC):
     """A structure as a simulator sees it."""
 
     structure: Structure
-    independent: bool
-    """Whether its equations are others than those of the library."""
+    simulator: str
+    """Whose equations of motion it has; "own" are those of the library."""
     unit: float
     """Time T of the model in the unit of schedules."""
     chain: int = 0

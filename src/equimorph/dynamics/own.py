@@ -16,7 +16,7 @@ CONVERGED = 1e-9
 class OwnModel(DirectModel):
     """M ü + C u̇ = −∂L/∂u on the constraints, with C = η ω₁² M, so that ζ₁ = ½ η ω₁."""
 
-    independent = False
+    simulator = "own"
 
     def plant(self, start: State, step: float, damping: float) -> Plant:
         """The structure at rest at a state."""

@@ -35,7 +35,7 @@ SAME_REST = 1e-4
 NEGLIGIBLE = 1e-5
 """Change of the deviation, relative to the structure's size, that is none."""
 
-Simulator = Annotated[Literal["mujoco", "own"], one_of("mujoco", "own")]
+Simulator = Annotated[Literal["mujoco", "pyelastica", "own"], one_of("mujoco", "pyelastica", "own")]
 Convergence = Literal["converged", "not converged", "not checked"]
 
 
@@ -183,7 +183,8 @@ def replay(
     start
         State to start in; by default that of the schedule.
     simulator
-        "mujoco", or "own": the structure's own equations of motion, which are not independent.
+        "mujoco"; "pyelastica", in which rods that are clamped at both ends stretch and shear; or
+        "own": the structure's own equations of motion, which are not independent.
     rate
         Speed in the scaled parameters, per unit of time: radians for angles; for schedules without
         times, or instead of these.
@@ -204,7 +205,7 @@ def replay(
     ------
     InputError
         Without start or times, for a structure that the simulator does not cover (by name), or if
-        MuJoCo is not installed.
+        the simulator is not installed.
 
     Examples
     --------
@@ -309,7 +310,7 @@ def _judge(
     landed = landing(begin.structure, plant.guess(), rows[-1]) if gone else None
     late = float("nan") if where is None or fold is None else where - fold
     return Replay(
-        begin, "mujoco" if model.independent else "own", times, rows, points, reference,
+        begin, model.simulator, times, rows, points, reference,
         model.chain or points.shape[1],
         _largest(points - reference), _largest(course.points - reference),
         _largest(points - course.points), gone, where, fold, late, expected, landed,

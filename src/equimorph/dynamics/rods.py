@@ -54,9 +54,7 @@ def rod_linkage(rod: Rod, links: int) -> Linkage:
     build, nodes = made.build, np.linspace(0.0, 1.0, links + 1)
     breaks = build.mesh.breaks
     cells = np.concatenate([[0.0], nodes[:-1] + 0.5 / links, [1.0]])
-    soft = integrals(lambda s: FOUR_PI_SQUARED / build.stiffness.density(s), cells, breaks)
-    rest = _rest_turns(made, cells, breaks)
-    bends, supports = _bends_and_supports(made, links, 1.0 / soft, rest)
+    bends, supports = _bends_and_supports(made, links, *stiffness_and_rest(made, cells))
     forces, couples, pressure = _loads(made, nodes, breaks)
     axial, strains = _stretch(made, nodes, breaks)
     count, size = made.table.shape[1], 6 + 2 * links
@@ -77,17 +75,21 @@ def rod_linkage(rod: Rod, links: int) -> Linkage:
     )
 
 
-def _rest_turns(
-    made: Construction, cells: Float[np.ndarray, " edges"], breaks: Float[np.ndarray, " breaks"]
-) -> Float[np.ndarray, "cells settings"]:
-    """Turns of the cells without moment: intrinsic curvature, and what tendons bend."""
-    build = made.build
+def stiffness_and_rest(
+    made: Construction, cells: Float[np.ndarray, " edges"]
+) -> tuple[Float[np.ndarray, " cells"], Float[np.ndarray, "cells settings"]]:
+    """Moment per turn of the cells of a rod, in λ_cr L, and their turns without moment.
+
+    The turns come from intrinsic curvature, and from what tendons bend.
+    """
+    build, breaks = made.build, made.build.mesh.breaks
+    soft = integrals(lambda s: FOUR_PI_SQUARED / build.stiffness.density(s), cells, breaks)
     out = np.zeros((len(cells) - 1, made.table.shape[1]))
     out[:, -1] = integrals(build.curvature.density, cells, breaks)
     for name, terms in build.terms.items():
         for term in terms:
             out += np.outer(integrals(_turning(term, build), cells, breaks), made.row(name))
-    return out
+    return 1.0 / soft, out
 
 
 def _turning(term: Term, build: Build) -> Function:
@@ -238,30 +240,35 @@ class ChainedRod(Chained):
         self._middles = (np.arange(links) + 0.5) / links
         self._joints = np.linspace(0.0, 1.0, links + 1)
 
-    def _fields(self, states: States, s: Float[np.ndarray, " points"]) -> np.ndarray:
+    def fields(self, states: States, s: Float[np.ndarray, " points"]) -> np.ndarray:
+        """Angle, its rate, and place at arclengths, in lengths of the rod."""
         return self._mechanics.fields(states.z, states.p, s)
 
     def angles(self, state: State) -> Float[np.ndarray, "members links"]:
         """Angles at the middles of the links."""
-        return np.asarray(self._fields(state.batch, self._middles)[:, :, 0])
+        return np.asarray(self.fields(state.batch, self._middles)[:, :, 0])
 
     def turns(self, state: State) -> Float[np.ndarray, " nodes"]:
         """Angles of the ends."""
-        return np.asarray(self._fields(state.batch, np.array([0.0, 1.0]))[0, :, 0])
+        return np.asarray(self.fields(state.batch, np.array([0.0, 1.0]))[0, :, 0])
 
     def node_places(self, state: State) -> Float[np.ndarray, "nodes 2"]:
         """Places of the ends."""
-        return np.asarray(self._fields(state.batch, np.array([0.0, 1.0]))[0, :, 2:])
+        return np.asarray(self.fields(state.batch, np.array([0.0, 1.0]))[0, :, 2:])
 
     def places(self, states: States) -> Float[np.ndarray, "lanes members joints 2"]:
         """Places at the ends of links, in the structure's unit of length."""
-        return np.asarray(self._fields(states, self._joints)[:, None, :, 2:] * self.length)
+        return np.asarray(self.fields(states, self._joints)[:, None, :, 2:] * self.length)
 
     def unknowns(self, v: Vector) -> Float[np.ndarray, " size"]:
         """Angles at the rod's nodes, by a spline through those of the links."""
-        mechanics = self._mechanics
-        theta = v[self.linkage.angle_entries[0]]
-        spline = CubicSpline(self._middles, theta)
+        return self.unknowns_through(self._middles, v[self.linkage.angle_entries[0]])
+
+    def unknowns_through(
+        self, s: Float[np.ndarray, " points"], angles: Float[np.ndarray, " points"]
+    ) -> Float[np.ndarray, " size"]:
+        """Unknowns by a spline through angles at arclengths; multipliers 0."""
+        mechanics, spline = self._mechanics, CubicSpline(s, angles)
         out = np.zeros(mechanics.size)
         out[: mechanics.unknowns] = spline(mechanics.mesh.nodes)[mechanics.unknown_nodes]
         return out

@@ -26,7 +26,7 @@ class SimulatedPlant:
     start
         Stable state in which it rests at first.
     simulator
-        "mujoco", or "own": the structure's own equations of motion.
+        "mujoco", "pyelastica", or "own": the structure's own equations of motion.
     rate
         Speed of the scaled parameters, per unit of time.
     settings

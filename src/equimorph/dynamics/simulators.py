@@ -1,5 +1,6 @@
 """Which simulator covers which structure."""
 
+from equimorph.dynamics.cosserat import CosseratModel, elastica_module
 from equimorph.dynamics.frames import ChainedFrame
 from equimorph.dynamics.linkage_model import LinkageModel
 from equimorph.dynamics.model import Model
@@ -22,13 +23,18 @@ def model_of(start: State, simulator: str, links: int) -> Model:
     structure = start.structure
     if simulator == "own":
         return OwnModel(structure, start)
-    mujoco_module()
-    if isinstance(structure, Rod):
-        return LinkageModel(ChainedRod(structure, links))
-    if isinstance(structure, Frame):
-        return LinkageModel(ChainedFrame(structure, links))
-    if isinstance(structure, Truss):
-        return TrussModel(structure, start)
+    if simulator == "pyelastica":
+        elastica_module()
+        if isinstance(structure, Rod):
+            return CosseratModel(structure, start, links)
+    else:
+        mujoco_module()
+        if isinstance(structure, Rod):
+            return LinkageModel(ChainedRod(structure, links))
+        if isinstance(structure, Frame):
+            return LinkageModel(ChainedFrame(structure, links))
+        if isinstance(structure, Truss):
+            return TrussModel(structure, start)
     raise InputError(
         f"`simulator` must cover the structure; got {simulator!r} for a {structure.kind}. "
         'simulator="own" replays every structure by its own equations of motion.'

@@ -101,7 +101,7 @@ def snap_in_time(
     start
         Stable state before it.
     simulator
-        "mujoco" or "own".
+        "mujoco", "pyelastica" or "own".
     apart
         Distance of the holds from the simulator's own fold, as a share of the way.
     dampings

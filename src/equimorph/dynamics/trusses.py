@@ -16,7 +16,7 @@ from equimorph.structures import State, Truss
 class TrussModel(DirectModel):
     """A truss with engineering strain, whose bars are springs of stiffness EA/l₀."""
 
-    independent = True
+    simulator = "mujoco"
 
     def __init__(self, truss: Truss, start: State) -> None:
         if truss.energies.green:

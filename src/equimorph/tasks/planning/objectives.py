@@ -10,7 +10,7 @@ from jaxtyping import Float, Int
 
 from equimorph.argument_kinds import ANYTHING, short
 from equimorph.errors import InputError, suggestion
-from equimorph.model import Rates, names_of
+from equimorph.model import Rates, Schedule, names_of
 from equimorph.structures import States, Structure, stability_margin
 
 Values = Float[np.ndarray, " pairs"]
@@ -106,6 +106,13 @@ class Objective:
         """Cost of the short way between pairs of states, by the trapezoidal rule."""
         places = self.places(states, error)
         return self.between(places[first], places[second])
+
+    def timed(self, schedule: Schedule) -> Schedule:
+        """A schedule with the times of its rates, if they limit every parameter that moves."""
+        for _, term in self.terms:
+            if isinstance(term, Rates) and set(schedule.moving) <= set(term.limits):
+                return schedule.in_time(term)
+        return schedule
 
     def along(self, states: States) -> float:
         """Cost of the way through states in turn."""

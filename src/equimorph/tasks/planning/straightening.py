@@ -246,8 +246,10 @@ def check_margin(route: Route, demands: Demands) -> Route:
         return route
     if route.margin >= demands.margin:
         assert route.path is not None
-        cost = demands.objective.along(route.path.states)
-        return replace(route, objective=str(demands.objective), cost=cost)
+        assert route.schedule is not None
+        aim = demands.objective
+        cost, schedule = aim.along(route.path.states), aim.timed(route.schedule)
+        return replace(route, objective=str(aim), cost=cost, schedule=schedule)
     return refusal(
         f"the stability margin falls to {route.margin:.4g} on the way, below {demands.margin:g}",
         route.way_points,
