@@ -300,7 +300,7 @@ class CosseratPlant(Plant):
         state = State(structure, found.z[0], self.p)
         if not (found.found[0] and state.index == 0):
             return None
-        return self._model.reference(state.batch)[0]
+        return np.asarray(self._model.reference(state.batch)[0])
 
     def guess(self) -> Float[np.ndarray, " size"]:
         """Unknowns of the rod, multipliers 0."""
