@@ -328,6 +328,11 @@ from .control import (
     ControlStatus as ControlStatus,
 )
 
+# Compute on several cores
+from .linalg import (
+    set_threads as set_threads,
+)
+
 # Errors
 from .errors import (
     EquimorphError as EquimorphError,

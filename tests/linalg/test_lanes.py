@@ -5,6 +5,7 @@ import threading
 import numpy as np
 import pytest
 
+import equimorph as em
 from equimorph.linalg.lanes import in_background, over_lanes, results_of, threads
 
 
@@ -113,3 +114,52 @@ def test_tasks_that_have_not_begun_are_dropped_after_an_error():
     for each in [*held, *in_background([int] * threads())]:
         each.result()
     assert begun == []
+
+
+@pytest.fixture
+def restored():
+    yield
+    em.set_threads()
+
+
+@pytest.mark.usefixtures("restored")
+def test_results_are_the_same_bits_on_any_number_of_threads():
+    """Chunks of lanes and tasks are computed alone, whoever computes them."""
+    spring = em.Spring()
+    box = em.Box(x_l=(0.5, 1.3), F=(-0.2, 0.2))
+    p = np.column_stack([np.linspace(0.6, 0.95, 700), np.zeros(700), np.ones(700)])
+    starts = em.States(spring, spring.natural(p)[0], p)
+    seen = []
+    for count in (1, 2, 5):
+        em.set_threads(count)
+        assert threads() == count
+        eset = em.equilibrium_set(spring, box, intervals=(8, 8), checks=0)
+        limits = em.limit_load(starts, "F")
+        seen.append(
+            [
+                eset.points.z,
+                eset.points.p,
+                eset.cells,
+                limits.value,
+                limits.states.z,
+                limits.states.margin,
+            ]
+        )
+    for others in seen[1:]:
+        for one, other in zip(seen[0], others, strict=True):
+            np.testing.assert_array_equal(one, other)
+
+
+@pytest.mark.usefixtures("restored")
+def test_the_environment_says_how_many_threads_there_are(monkeypatch):
+    monkeypatch.setenv("EQUIMORPH_THREADS", " 3 ")
+    em.set_threads()
+    assert threads() == 3
+    monkeypatch.setenv("EQUIMORPH_THREADS", "many")
+    with pytest.raises(
+        em.InputError, match=r"`EQUIMORPH_THREADS` must be a whole number >= 1; got 'many'"
+    ):
+        em.set_threads()
+    assert threads() == 3
+    with pytest.raises(em.InputError, match=r"`count` must be a whole number from 1"):
+        em.set_threads(0)

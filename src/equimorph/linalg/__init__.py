@@ -10,6 +10,7 @@ from equimorph.linalg.dense import (
     orthonormal_rows,
     solve_bordered,
 )
+from equimorph.linalg.lanes import set_threads
 
 __all__ = [
     "Border",
@@ -19,5 +20,6 @@ __all__ = [
     "negative_eigenvalues",
     "no_border",
     "orthonormal_rows",
+    "set_threads",
     "solve_bordered",
 ]

@@ -4,12 +4,14 @@ import os
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from itertools import pairwise
 from typing import Any, TypeVar
 
 import numpy as np
 
+from equimorph.argument_checks import check_arguments
+from equimorph.errors import InputError
 from equimorph.linalg.simd import LANES
 
 SMALLEST_SHARE = 256
@@ -21,10 +23,60 @@ _FILLED = [np.minimum(np.arange(LANES), max(lanes - 1, 0)) for lanes in range(LA
 """Lanes of blocks that are filled up with copies of the last one."""
 
 
-@lru_cache(maxsize=1)
-def _pool() -> ThreadPoolExecutor:
-    return ThreadPoolExecutor(threads(), thread_name_prefix="lanes", initializer=_mark)
+VARIABLE = "EQUIMORPH_THREADS"
+"""Environment variable for the number of threads."""
 
+
+@lru_cache(maxsize=1)
+def _pool_of(count: int) -> ThreadPoolExecutor:
+    return ThreadPoolExecutor(count, thread_name_prefix="lanes", initializer=_mark)
+
+
+def _pool() -> ThreadPoolExecutor:
+    return _pool_of(_number.chosen)
+
+
+@check_arguments
+def set_threads(count: int | None = None) -> None:
+    """Set how many threads this process computes on; results do not depend on it.
+
+    Before the first call, and after one without a count, it is the environment variable
+    ``EQUIMORPH_THREADS``, or else the number of processors that the process may use. Threads of
+    the linear algebra library are left alone.
+
+    Raises
+    ------
+    InputError
+        If the count, or that in the environment, is not a whole number above zero.
+
+    Examples
+    --------
+    >>> import equimorph as em
+    >>> em.set_threads(1)  # one process for each processor, as in a pool of processes
+    >>> em.set_threads()
+    """
+    _number.chosen = _default() if count is None else count
+
+
+def _default() -> int:
+    """Number of threads by the environment, or that of processors."""
+    text = os.environ.get(VARIABLE, "").strip()
+    if text:
+        if not text.isdecimal() or int(text) < 1:
+            raise InputError(f"`{VARIABLE}` must be a whole number >= 1; got {text!r}.")
+        return int(text)
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+class _Number:
+    """Number of threads of this process, read from the environment when it is first asked for."""
+
+    @cached_property
+    def chosen(self) -> int:
+        return _default()
+
+
+_number = _Number()
 
 _worker = threading.local()
 
@@ -58,10 +110,8 @@ def results_of(tasks: Sequence[Callable[[], Result]]) -> Iterator[Result]:
 
 
 def threads() -> int:
-    """Number of processors that this process may use; 1 inside a thread of the pool."""
-    if hasattr(_worker, "own"):
-        return 1
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    """Number of threads that share the work, see `set_threads`; 1 inside a thread of the pool."""
+    return 1 if hasattr(_worker, "own") else _number.chosen
 
 
 def over_lanes(
@@ -84,7 +134,7 @@ def over_lanes(
             array[:] = result[:lanes]
         return
     shares = lanes // SMALLEST_SHARE
-    shares = min(threads(), shares) if shares > 1 else shares  # to ask the system takes a while
+    shares = min(threads(), shares)
     if shares < 2:
         kernel(*shared, *inputs, *outputs)
         return
