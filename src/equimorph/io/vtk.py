@@ -29,7 +29,7 @@ def read_vtk(path: Path) -> Drawing:
     except (OSError, ValueError, AttributeError, RuntimeError) as error:
         raise InputError(f"`{path.name}` must be a mesh of VTK; got: {error}.") from error
     points, kinds = np.asarray(grid.points, dtype=float), np.asarray(grid.celltypes)
-    cells = _cells(np.array(grid.cells, dtype=np.int64))
+    cells = _cells(grid.cells.tolist())
     found: list[Polyline] = [
         points[cell] for cell, kind in zip(cells, kinds, strict=True) if kind in (LINE, POLYLINE)
     ]
@@ -39,10 +39,11 @@ def read_vtk(path: Path) -> Drawing:
     return Drawing(found, content=count_words(f"cells of type {kind}" for kind in kinds.tolist()))
 
 
-def _cells(flat: Int[np.ndarray, " numbers"]) -> list[Int[np.ndarray, " corners"]]:
+def _cells(flat: list[int]) -> list[Int[np.ndarray, " corners"]]:
     """Corners of each cell, of a list in which their number precedes them."""
-    found, at = [], 0
+    found: list[Int[np.ndarray, " corners"]] = []
+    at = 0
     while at < len(flat):
-        found.append(flat[at + 1 : at + 1 + flat[at]])
-        at += 1 + int(flat[at])
+        found.append(np.array(flat[at + 1 : at + 1 + flat[at]]))
+        at += 1 + flat[at]
     return found
