@@ -30,7 +30,7 @@ class Drawing:
 
 
 def edges_of_faces(
-    points: Float[np.ndarray, "points 3"], faces: Iterable[Int[np.ndarray, " corners"]]
+    points: Float[np.ndarray, "vertices 3"], faces: Iterable[Int[np.ndarray, " corners"]]
 ) -> list[Polyline]:
     """Edges of faces, each face as a closed polyline."""
     return [points[np.append(face, face[0])] for face in faces]
