@@ -6,7 +6,7 @@ INSTALLED := .venv/.installed
 # One thread per worker in the linear algebra library: two workers share the machine.
 QUIET_THREADS := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 
-.PHONY: run paper test test-slow lint docs bench explorer clean
+.PHONY: run paper test test-slow lint docs lock bench explorer clean
 
 run: $(INSTALLED)
 	$(BIN)/equimorph run examples/arch.toml
@@ -31,6 +31,11 @@ lint: $(INSTALLED)
 docs: .venv/.docs
 	$(BIN)/python -m sphinx --fail-on-warning --keep-going --quiet --jobs 2 docs results/docs
 	@echo "results/docs/index.html"
+
+# Versions with hashes for whoever wants exactly these; the other targets do not use them.
+lock:
+	uv pip compile pyproject.toml --extra dev --extra docs --universal --generate-hashes --quiet \
+	    --no-header --no-annotate --output-file requirements-dev.lock
 
 bench: $(INSTALLED)
 	$(BIN)/python -m pytest -o addopts="--import-mode=importlib" -p no:xdist --benchmark-only benchmarks

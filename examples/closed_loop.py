@@ -26,7 +26,8 @@ def main(seed: int = 1) -> np.ndarray:
     )
     settings = em.ReplaySettings(links=20, step=0.05, hold=5.0)
     plant = em.SimulatedPlant(upright, rate=0.1, settings=settings)
-    random, load, rows = np.random.default_rng(seed), 2.5, []
+    random, load = np.random.default_rng(seed), 2.5
+    rows: list[tuple[float, ...]] = []
     belief = controller.start(upright)
 
     def write(command: Mapping[str, float]) -> None:

@@ -4,7 +4,8 @@ Aliases for shapes that only one module uses stay in that module.
 """
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+
+from equimorph.array_types import Bool, Float, Int
 
 # one row for each lane of a batch
 Lanes = Float[np.ndarray, "lanes size"]

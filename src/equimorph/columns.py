@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from typing import Any, ClassVar, TypeVar
 
 import numpy as np
-from jaxtyping import Bool, Int
 
+from equimorph.array_types import Bool, Int
 from equimorph.arrays import Some
 
 Record = TypeVar("Record", bound="Columns")

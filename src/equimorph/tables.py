@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 import numpy as np
-from jaxtyping import Shaped
 
+from equimorph.array_types import Shaped
 from equimorph.optional_packages import load_package
 
 Column = Shaped[np.ndarray, " rows"] | Sequence[object]

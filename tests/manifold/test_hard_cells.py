@@ -4,8 +4,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from jaxtyping import Float
 
+from equimorph.array_types import Float
 from equimorph.manifold import equilibrium_set
 from equimorph.model import Box, Parameter
 from equimorph.structures import EnergyStructure, Rod, Unknown

@@ -5,8 +5,8 @@ exactly. An edge that passes a vertex within one spacing is bent to pass through
 """
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
 
+from equimorph.array_types import Bool, Float, Int
 from equimorph.arrays import Edges, ItemFlags, ItemValues
 
 Places = Float[np.ndarray, "places 2"]

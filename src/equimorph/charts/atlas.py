@@ -5,9 +5,9 @@ from functools import cached_property
 from itertools import combinations
 
 import numpy as np
-from jaxtyping import Int
 
 from equimorph.argument_checks import check_arguments
+from equimorph.array_types import Int
 from equimorph.arrays import CellNumbers, ItemFlags, Items, Points
 from equimorph.charts.chart import Chart
 from equimorph.charts.coordinates import Coordinates, coordinates_of

@@ -7,9 +7,9 @@ from enum import IntEnum
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
 
 from equimorph.argument_checks import check_arguments
+from equimorph.array_types import Bool, Float, Int
 from equimorph.arrays import Points
 from equimorph.charts.coordinates import Coordinates, coordinates_of, frames_anywhere
 from equimorph.charts.domain import (

@@ -3,11 +3,11 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import breadth_first_order, dijkstra, maximum_flow
 from scipy.spatial import cKDTree
 
+from equimorph.array_types import Bool, Float, Int
 from equimorph.arrays import Pairs
 from equimorph.charts.location import Cells
 from equimorph.manifold.geometry.topology import labels

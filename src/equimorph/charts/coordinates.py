@@ -4,8 +4,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Int
 
+from equimorph.array_types import Float, Int
 from equimorph.arrays import Flags, Frames, Lanes, Numbers, Parameters, Rows, Some
 from equimorph.equilibria.point_conditions import Values as TargetValues
 from equimorph.equilibria.settle import (

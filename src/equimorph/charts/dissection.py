@@ -4,9 +4,9 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-from jaxtyping import Bool, Int
 
 from equimorph.argument_checks import check_arguments
+from equimorph.array_types import Bool, Int
 from equimorph.arrays import CellNumbers, ItemValues, Pairs
 from equimorph.charts.atlas import Atlas
 from equimorph.charts.chart import check_cells

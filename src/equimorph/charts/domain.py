@@ -5,10 +5,10 @@ from functools import cached_property
 from itertools import combinations, pairwise
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
 from scipy.spatial import cKDTree
 
 from equimorph.argument_checks import check_arguments
+from equimorph.array_types import Bool, Float, Int
 from equimorph.arrays import Place, Points
 from equimorph.charts.arrangement import cross, outline, winding
 from equimorph.charts.location import Cells, EdgeKind, facet_kinds

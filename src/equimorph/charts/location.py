@@ -5,8 +5,8 @@ from enum import StrEnum
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
 
+from equimorph.array_types import Bool, Float, Int
 from equimorph.arrays import (
     Facets,
     Flags,

@@ -5,9 +5,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from jaxtyping import Bool
 
 from equimorph.argument_checks import check_arguments
+from equimorph.array_types import Bool
 from equimorph.arrays import Flags, Lanes, Parameters, Points
 from equimorph.charts.location import Found
 from equimorph.charts.rules import Chooser, Identity, Rule, first_of_each, highest, lowest, nearest

@@ -5,10 +5,10 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
-from jaxtyping import Float, Int
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 
+from equimorph.array_types import Float, Int
 from equimorph.arrays import CellFlags, CellNumbers, VertexFlags
 from equimorph.charts.preparation import first_copies
 from equimorph.manifold import EquilibriumSet

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Bool, Int
 
 from equimorph.argument_checks import check_arguments
+from equimorph.array_types import Bool, Int
 from equimorph.arrays import Points, VertexFlags
 from equimorph.charts.barriers import Barrier, barriers_of, gaps_of
 from equimorph.charts.chart import Chart, Charted, PointStatus, check_cells

@@ -18,8 +18,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
 
+from equimorph.array_types import Bool, Float, Int
 from equimorph.charts.arrangement import arrange, cross, outline, sides, winding, winding_raster
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.geometry.topology import adjacency, senses

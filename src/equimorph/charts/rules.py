@@ -5,10 +5,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from jaxtyping import Bool, Float
 from scipy.spatial import cKDTree
 
 from equimorph.argument_checks import check_arguments
+from equimorph.array_types import Bool, Float
 from equimorph.arrays import Points
 from equimorph.charts.location import Found
 from equimorph.errors import InputError

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Float
 from scipy.spatial import cKDTree
 
+from equimorph.array_types import Float
 from equimorph.arrays import Frames, Items, Place, Places, Points
 from equimorph.charts.coordinates import Coordinates, solve_on_the_set
 from equimorph.charts.location import Cells, Found

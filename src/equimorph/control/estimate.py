@@ -9,8 +9,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
 
+from equimorph.array_types import Float
 from equimorph.arrays import Values
 from equimorph.control.belief import Covariance, Loads
 from equimorph.control.likely import Places, moved

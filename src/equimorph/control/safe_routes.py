@@ -4,8 +4,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from jaxtyping import Int
 
+from equimorph.array_types import Int
 from equimorph.arrays import Values
 from equimorph.control.likely import Bundles, LikelyLoads, moved, positions
 from equimorph.equilibria import TraceOptions

@@ -4,9 +4,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
 from scipy.linalg import eigh, null_space
 
+from equimorph.array_types import Float
 from equimorph.dynamics.linkage import Linkage, Pulls, Settings, Vector
 
 NEWTON_STEPS = 40

@@ -3,8 +3,8 @@
 from abc import ABC, abstractmethod
 
 import numpy as np
-from jaxtyping import Float
 
+from equimorph.array_types import Float
 from equimorph.dynamics.linkage import Linkage, Vector
 from equimorph.structures import State, States, Structure
 

@@ -3,8 +3,8 @@
 from abc import abstractmethod
 
 import numpy as np
-from jaxtyping import Float
 
+from equimorph.array_types import Float
 from equimorph.arrays import Lanes, Parameters
 from equimorph.dynamics.fold_delay import FoldDelay
 from equimorph.dynamics.model import Course, Model, Motion, Plant, Points, Row

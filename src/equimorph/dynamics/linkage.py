@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+
+from equimorph.array_types import Bool, Float, Int
 
 Vector = Float[np.ndarray, " entries"]
 Pulls = Float[np.ndarray, " pulls"]

@@ -3,8 +3,8 @@
 from dataclasses import replace
 
 import numpy as np
-from jaxtyping import Float
 
+from equimorph.array_types import Float
 from equimorph.dynamics.balance import Balance, Quasistatics, balance, follow
 from equimorph.dynamics.chained import Chained
 from equimorph.dynamics.fold_delay import fold_delay

@@ -5,8 +5,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
 
+from equimorph.array_types import Float
 from equimorph.dynamics.fold_delay import FoldDelay
 from equimorph.equilibria import settle, snap_landing
 from equimorph.errors import InputError

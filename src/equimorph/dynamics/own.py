@@ -1,8 +1,8 @@
 """The library's own equations of motion, for every structure: not independent of its statics."""
 
 import numpy as np
-from jaxtyping import Float
 
+from equimorph.array_types import Float
 from equimorph.arrays import Lanes, Parameters
 from equimorph.dynamics.direct import DirectModel, DirectPlant
 from equimorph.dynamics.model import Plant, Row

@@ -8,8 +8,8 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
 
+from equimorph.array_types import Bool, Float, Int
 from equimorph.dynamics.linkage import Linkage, Settings, Vector
 from equimorph.dynamics.tree import WORLD, tree_of
 from equimorph.dynamics.writer import Spring, Writer

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
 
+from equimorph.array_types import Float
 from equimorph.dynamics.model import Model
 from equimorph.structures import State
 from equimorph.tasks.route import FINE

@@ -5,11 +5,11 @@ from dataclasses import dataclass, replace
 from typing import Annotated, Literal
 
 import numpy as np
-from jaxtyping import Float, Int
 
 from equimorph.argument_checks import check_arguments
 from equimorph.argument_kinds import one_of
 from equimorph.argument_vocabulary import POSITIVE
+from equimorph.array_types import Float, Int
 from equimorph.dynamics.model import Course, Model, Plant, landing
 from equimorph.dynamics.motion import TimedCorners, timed_corners
 from equimorph.dynamics.quasistatics import equilibria_along

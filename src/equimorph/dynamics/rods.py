@@ -3,9 +3,9 @@
 from collections.abc import Callable
 
 import numpy as np
-from jaxtyping import Float
 from scipy.interpolate import CubicSpline
 
+from equimorph.array_types import Float
 from equimorph.dynamics.chained import Chained
 from equimorph.dynamics.linkage import Bends, Linkage, Supports, Vector
 from equimorph.errors import MissingError

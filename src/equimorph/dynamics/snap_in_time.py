@@ -4,9 +4,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
 
 from equimorph.argument_checks import check_arguments
+from equimorph.array_types import Float
 from equimorph.dynamics.model import Model, landing
 from equimorph.dynamics.motion import TimedCorners, timed_corners
 from equimorph.dynamics.replay import STILL, ReplaySettings, Simulator

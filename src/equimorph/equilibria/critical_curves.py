@@ -5,9 +5,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Int
 
 from equimorph.argument_checks import check_arguments
+from equimorph.array_types import Float, Int
 from equimorph.arrays import Values
 from equimorph.equilibria.critical import normal_form
 from equimorph.equilibria.critical_tests import (

@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 
 import numpy as np
-from jaxtyping import Int
 
+from equimorph.array_types import Int
 from equimorph.arrays import Values
 from equimorph.equilibria.critical import Critical, Test
 from equimorph.equilibria.lift import check_start

@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 from typing import Protocol, runtime_checkable
 
 import numpy as np
-from jaxtyping import Float
 
+from equimorph.array_types import Float
 from equimorph.arrays import Lanes, Numbers, Parameters, Some, Values
 from equimorph.equilibria.kernels import squared_lengths
 from equimorph.linalg import Border, BorderedSolution

@@ -6,8 +6,8 @@ See docs/decisions.md, "Snap landings are gradient flows".
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Int
 
+from equimorph.array_types import Float, Int
 from equimorph.arrays import Flags, Lanes, Parameters, Values
 from equimorph.equilibria.gradient_flow import (
     QUICK,

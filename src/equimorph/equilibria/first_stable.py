@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Shaped
 
+from equimorph.array_types import Float, Shaped
 from equimorph.arrays import Flags, Lanes, Numbers, Parameters, Values
 from equimorph.columns import Columns
 from equimorph.equilibria.critical import criticality

@@ -7,8 +7,8 @@ values and slopes. Where that comes close to zero, the step is searched.
 from dataclasses import replace
 
 import numpy as np
-from jaxtyping import Float
 
+from equimorph.array_types import Float
 from equimorph.arrays import Flags, Lanes, Numbers, Parameters, Some, Values
 from equimorph.equilibria.curves import Curve, dual
 from equimorph.equilibria.events import Events, locate_all

@@ -9,8 +9,8 @@ See docs/decisions.md, "Hidden events".
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
 
+from equimorph.array_types import Bool, Float, Int
 from equimorph.arrays import Lanes
 from equimorph.columns import Columns
 from equimorph.equilibria.critical import Critical, null_border

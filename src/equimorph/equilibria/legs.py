@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from typing import Annotated, Any
 
 import numpy as np
-from jaxtyping import Float
 
+from equimorph.array_types import Float
 from equimorph.arrays import Flags, Lanes, Parameters, Some
 from equimorph.equilibria.curves import Curve, ParameterLine
 from equimorph.equilibria.prescribed_curves import (

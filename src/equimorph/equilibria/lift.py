@@ -5,9 +5,9 @@ from dataclasses import dataclass, field, replace
 from typing import overload
 
 import numpy as np
-from jaxtyping import Float, Int, Shaped
 
 from equimorph.argument_checks import check_arguments
+from equimorph.array_types import Float, Int, Shaped
 from equimorph.arrays import Flags, Lanes, Numbers, Parameters, Some, Values
 from equimorph.columns import Columns
 from equimorph.equilibria.critical import criticality

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from typing import overload
 
 import numpy as np
-from jaxtyping import Shaped
 
 from equimorph.argument_checks import check_arguments
+from equimorph.array_types import Shaped
 from equimorph.arrays import Values
 from equimorph.equilibria.legs import check_starts, violations
 from equimorph.equilibria.lift import Path, lift

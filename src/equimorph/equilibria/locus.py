@@ -4,8 +4,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Float, Int
 
+from equimorph.array_types import Float, Int
 from equimorph.arrays import Flags, Lanes, Numbers, Parameters, Values
 from equimorph.columns import Columns
 from equimorph.equilibria.critical import Critical, Test, null_border

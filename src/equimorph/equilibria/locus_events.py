@@ -4,9 +4,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Float
 from scipy.optimize import brentq
 
+from equimorph.array_types import Float
 from equimorph.arrays import Numbers, Values
 from equimorph.columns import Columns
 from equimorph.equilibria.critical import Test

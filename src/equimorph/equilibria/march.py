@@ -6,8 +6,8 @@ See docs/decisions.md, "Lanes march in compiled kernels".
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Float
 
+from equimorph.array_types import Float
 from equimorph.arrays import Flags, Lanes, Numbers, Some, Values
 from equimorph.equilibria import kernels
 from equimorph.equilibria import step_kernels as stepping

@@ -11,10 +11,10 @@ from enum import StrEnum
 from itertools import pairwise
 
 import numpy as np
-from jaxtyping import Float, Int
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components, csgraph_from_dense, dijkstra
 
+from equimorph.array_types import Float, Int
 from equimorph.arrays import Items, Lanes
 from equimorph.equilibria.descents import descend
 from equimorph.equilibria.gradient_flow import QUICK, Ending, Pace

@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
 from scipy import ndimage
 
+from equimorph.array_types import Bool, Float, Int
 from equimorph.arrays import Flags, Lanes, Parameters, Settings
 from equimorph.equilibria.settle import Guards, settle
 from equimorph.model import Grid, position

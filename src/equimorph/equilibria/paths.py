@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Float, Int
 
+from equimorph.array_types import Float, Int
 from equimorph.arrays import Lanes, Some, Values
 from equimorph.equilibria.critical import criticality
 from equimorph.equilibria.curves import Curve, ParameterLine

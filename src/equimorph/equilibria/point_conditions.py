@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
 import numpy as np
-from jaxtyping import Float
 
+from equimorph.array_types import Float
 from equimorph.arrays import Lanes, Parameters, Scalars, Some
 from equimorph.columns import Columns
 from equimorph.equilibria.critical import Critical, Test

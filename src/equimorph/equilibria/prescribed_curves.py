@@ -6,9 +6,9 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
-from jaxtyping import Float, Int
 from numpy.polynomial import chebyshev
 
+from equimorph.array_types import Float, Int
 from equimorph.arrays import Lanes, Numbers, Parameters, Some, Values
 from equimorph.equilibria.critical import Critical
 from equimorph.equilibria.curves import PlainCurve

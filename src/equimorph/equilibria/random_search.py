@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Int
 
+from equimorph.array_types import Float, Int
 from equimorph.arrays import Lanes, Numbers, Parameters, Values
 from equimorph.equilibria.curves import ParameterLine, growing_force, newton_homotopy
 from equimorph.equilibria.saddles import Pairs, strongest_pushes

@@ -8,10 +8,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
 from scipy.special import gammaln, xlogy
 
 from equimorph.argument_checks import check_arguments
+from equimorph.array_types import Bool, Float, Int
 from equimorph.equilibria.legs import check_isolated
 from equimorph.equilibria.minima_graph import Argument, MinimaGraph, arguments_of, contradicts
 from equimorph.equilibria.random_search import BEYOND, UNRESOLVED, Ground, Pools, distinct

@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 
 import numpy as np
-from jaxtyping import Float, Int
 
+from equimorph.array_types import Float, Int
 from equimorph.arrays import Lanes, Parameters
 from equimorph.model import Descriptor
 from equimorph.structures import Structure

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from enum import IntEnum
 
 import numpy as np
-from jaxtyping import Float, Int
 
+from equimorph.array_types import Float, Int
 from equimorph.arrays import Flags, Lanes, Numbers, Parameters, Rows, Some, Values
 from equimorph.equilibria.newton_kernels import judge_lanes
 from equimorph.equilibria.newton_step import (

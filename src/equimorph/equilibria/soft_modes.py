@@ -6,8 +6,8 @@ See docs/decisions.md, "Descents measure lengths by the soft mode".
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
 
+from equimorph.array_types import Float
 from equimorph.arrays import Flags, Lanes, Parameters, Values
 from equimorph.columns import Columns
 from equimorph.linalg import multiply

@@ -3,8 +3,8 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Float, Int
 
+from equimorph.array_types import Float, Int
 from equimorph.arrays import Flags, Lanes, Numbers, Some, Values
 from equimorph.columns import Columns
 from equimorph.equilibria import event_kernels, kernels

@@ -10,8 +10,8 @@ from concurrent.futures import wait
 from dataclasses import dataclass, field
 
 import numpy as np
-from jaxtyping import Bool
 
+from equimorph.array_types import Bool
 from equimorph.arrays import Lanes, Numbers, Some, Values
 from equimorph.equilibria.curves import Curve
 from equimorph.equilibria.events import Events, locate_all

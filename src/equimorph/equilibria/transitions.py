@@ -10,9 +10,9 @@ from functools import cached_property
 from itertools import pairwise, product
 
 import numpy as np
-from jaxtyping import Int
 
 from equimorph.argument_checks import check_arguments
+from equimorph.array_types import Int
 from equimorph.arrays import Flags, Values
 from equimorph.equilibria.energy_barriers import EnergyBarrier, EnergyPath, Merge, Status
 from equimorph.equilibria.gradient_flow import FAITHFUL, Ending

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from jaxtyping import Int, Num
 
+from equimorph.array_types import Int, Num
 from equimorph.charts import Reduction
 from equimorph.errors import InputError
 from equimorph.explorer.curved_edges import curved_edges

@@ -11,8 +11,8 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from jaxtyping import Num, UInt16
 
+from equimorph.array_types import Num, UInt16
 from equimorph.arrays import Values
 
 TOP = 65535

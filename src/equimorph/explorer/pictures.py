@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float, UInt16
 
+from equimorph.array_types import Float, UInt16
 from equimorph.arrays import Values
 from equimorph.explorer.packing import TOP
 from equimorph.model import Couples, Drawing, Forces

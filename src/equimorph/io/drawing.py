@@ -5,7 +5,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Int
+
+from equimorph.array_types import Float, Int
 
 Polyline = Float[np.ndarray, "points 3"]
 

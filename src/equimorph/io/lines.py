@@ -6,13 +6,13 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
-from jaxtyping import Float, Int
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from equimorph.argument_checks import check_arguments
 from equimorph.argument_kinds import one_of
+from equimorph.array_types import Float, Int
 from equimorph.errors import InputError
 from equimorph.io.compas import read_compas
 from equimorph.io.drawing import Drawing

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
 
+from equimorph.array_types import Float
 from equimorph.errors import InputError
 from equimorph.io.drawing import Drawing, edges_of_faces
 

@@ -3,8 +3,8 @@
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Int
 
+from equimorph.array_types import Int
 from equimorph.errors import InputError
 from equimorph.io.drawing import Drawing, Polyline, count_words, edges_of_faces
 from equimorph.optional_packages import load_package

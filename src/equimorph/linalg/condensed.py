@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Float, Int
 
+from equimorph.array_types import Float, Int
 from equimorph.arrays import Flags, Numbers, Values
 from equimorph.errors import InputError
 from equimorph.linalg.bordered_kernels import solve_condensed

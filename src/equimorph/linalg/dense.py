@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
 
+from equimorph.array_types import Float
 from equimorph.arrays import Flags, Lanes, Numbers, Values
 from equimorph.linalg.kernels import count_negative, multiply_lanes, orthonormal_lanes
 

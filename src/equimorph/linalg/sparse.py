@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Float, Int
 
+from equimorph.array_types import Float, Int
 from equimorph.linalg.dense import Border, BorderedSolution, no_border, solve_bordered
 from equimorph.linalg.lanes import over_lanes
 from equimorph.linalg.sparse_kernels import solve_sparse

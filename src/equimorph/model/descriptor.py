@@ -6,12 +6,12 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal, Protocol, overload, runtime_checkable
 
 import numpy as np
-from jaxtyping import Float
 
 from equimorph.argument_checks import check_arguments
 from equimorph.argument_kinds import is_number
 from equimorph.argument_notes import QUANTITY
 from equimorph.argument_vocabulary import LARGEST
+from equimorph.array_types import Float
 from equimorph.arrays import Flags, Lanes, Parameters, Values
 from equimorph.errors import InputError
 from equimorph.model.obstacle import Obstacle

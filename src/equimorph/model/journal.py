@@ -21,8 +21,8 @@ from types import (
 from typing import Any, Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
-from jaxtyping import Shaped
 
+from equimorph.array_types import Shaped
 from equimorph.errors import InputError
 from equimorph.model.descriptor import Descriptor
 

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
-from jaxtyping import Float
 
 from equimorph.argument_checks import check_arguments
 from equimorph.argument_notes import DIRECTION, PAIR
+from equimorph.array_types import Float
 
 Pair = Annotated[Sequence[float], PAIR]
 Places = Float[np.ndarray, "*points axes"]

@@ -6,10 +6,10 @@ from functools import cached_property
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
 from scipy.interpolate import BPoly
 
 from equimorph.argument_checks import check_arguments
+from equimorph.array_types import Bool, Float, Int
 from equimorph.errors import InputError, MissingError
 from equimorph.tables import Table, Tabular
 

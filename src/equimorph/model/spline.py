@@ -4,10 +4,10 @@ from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Float
 from scipy.interpolate import CubicSpline
 
 from equimorph.argument_checks import check_arguments
+from equimorph.array_types import Float
 from equimorph.errors import InputError
 
 Samples = Float[np.ndarray, "knots *lanes"]

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -12,6 +11,7 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
 from equimorph.argument_checks import check_arguments
+from equimorph.array_types import Float
 from equimorph.charts import Atlas, Chart, Domain, Edge, Reduction
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet

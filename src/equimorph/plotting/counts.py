@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import BoundaryNorm, ListedColormap
@@ -12,6 +11,7 @@ from matplotlib.patches import PathPatch
 from scipy import ndimage
 from scipy.spatial import cKDTree
 
+from equimorph.array_types import Float
 from equimorph.charts.regions import Regions, empty_regions
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Constraint

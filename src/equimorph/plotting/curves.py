@@ -3,8 +3,8 @@
 from itertools import pairwise
 
 import numpy as np
-from jaxtyping import Bool, Float, Int, Shaped
 
+from equimorph.array_types import Bool, Float, Int, Shaped
 from equimorph.equilibria import Path, settle
 from equimorph.errors import InputError
 from equimorph.manifold import Division, EquilibriumSet

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
 from mpl_toolkits.mplot3d import proj3d
+
+from equimorph.array_types import Bool, Float, Int
 
 
 @dataclass(frozen=True)

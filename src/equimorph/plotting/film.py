@@ -5,7 +5,6 @@ from pathlib import Path as FilePath
 from typing import Any, NamedTuple
 
 import numpy as np
-from jaxtyping import Float
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -15,6 +14,7 @@ from matplotlib.text import Text
 from PIL import Image
 
 from equimorph.argument_checks import check_arguments
+from equimorph.array_types import Float
 from equimorph.arrays import Values
 from equimorph.charts.regions import count_equilibria
 from equimorph.equilibria import Path

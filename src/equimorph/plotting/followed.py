@@ -3,11 +3,11 @@
 from collections.abc import Sequence
 
 import numpy as np
-from jaxtyping import Float
 from matplotlib.axes import Axes
 from mpl_toolkits.axes_grid1 import make_axes_locatable
 
 from equimorph.argument_checks import check_arguments
+from equimorph.array_types import Float
 from equimorph.model import Descriptor
 from equimorph.plotting import style
 from equimorph.plotting.labels import descriptor_label, parameter_label

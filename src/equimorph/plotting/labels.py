@@ -4,11 +4,11 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
 from matplotlib.axes import Axes
 from matplotlib.contour import ContourSet
 from matplotlib.transforms import Affine2D, Transform
 
+from equimorph.array_types import Float
 from equimorph.model import Constraint, Descriptor, position
 from equimorph.plotting import style
 from equimorph.structures import Structure

@@ -5,13 +5,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from equimorph.argument_checks import check_arguments
+from equimorph.array_types import Float
 from equimorph.manifold import EquilibriumSet, Level, level_set
 from equimorph.model import Descriptor
 from equimorph.plotting import style

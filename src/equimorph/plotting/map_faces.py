@@ -4,7 +4,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+
+from equimorph.array_types import Bool, Float, Int
 
 Axis = Float[np.ndarray, " _"]
 

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from jaxtyping import Bool, Float
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import PolyCollection
@@ -16,6 +15,7 @@ from matplotlib.ticker import MaxNLocator
 from matplotlib.tri import Triangulation
 
 from equimorph.argument_checks import check_arguments
+from equimorph.array_types import Bool, Float
 from equimorph.model.descriptor import CONSTRAINT
 from equimorph.plotting import style
 from equimorph.plotting.labels import (

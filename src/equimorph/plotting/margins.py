@@ -1,11 +1,11 @@
 """Stability margin and largest curvature along a route."""
 
 import numpy as np
-from jaxtyping import Float, Int
 from matplotlib.axes import Axes
 from mpl_toolkits.axes_grid1 import make_axes_locatable
 
 from equimorph.argument_checks import check_arguments
+from equimorph.array_types import Float, Int
 from equimorph.errors import InputError
 from equimorph.model import Schedule
 from equimorph.plotting import style

@@ -4,11 +4,11 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from equimorph.argument_checks import check_arguments
+from equimorph.array_types import Float
 from equimorph.charts.regions import count_equilibria
 from equimorph.equilibria import Path
 from equimorph.errors import InputError

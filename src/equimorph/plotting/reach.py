@@ -4,13 +4,13 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from equimorph.argument_checks import check_arguments
+from equimorph.array_types import Float
 from equimorph.charts.regions import count_regions
 from equimorph.errors import InputError
 from equimorph.plotting import style

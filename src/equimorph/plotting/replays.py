@@ -4,13 +4,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from PIL import Image
 
 from equimorph.argument_checks import check_arguments
+from equimorph.array_types import Float
 from equimorph.dynamics import Replay
 from equimorph.plotting import style
 from equimorph.plotting.film import durations, write_gif

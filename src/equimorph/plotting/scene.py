@@ -10,12 +10,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from jaxtyping import Bool, Float, UInt8
 from matplotlib.artist import Artist
 from matplotlib.collections import LineCollection
 from matplotlib.transforms import IdentityTransform
 from scipy import ndimage
 
+from equimorph.array_types import Bool, Float, UInt8
 from equimorph.plotting.depth import DepthBuffer, View, depth_buffer, view_of
 from equimorph.plotting.shading import Paint, paint
 

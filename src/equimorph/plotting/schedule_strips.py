@@ -3,11 +3,11 @@
 from itertools import groupby
 
 import numpy as np
-from jaxtyping import Float
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from equimorph.argument_checks import check_arguments
+from equimorph.array_types import Float
 from equimorph.errors import InputError
 from equimorph.model import Schedule
 from equimorph.plotting import style

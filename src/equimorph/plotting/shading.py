@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
 
+from equimorph.array_types import Bool, Float, Int
 from equimorph.plotting.depth import DepthBuffer, View, slopes
 
 Corners = Float[np.ndarray, "cells 3 3"]

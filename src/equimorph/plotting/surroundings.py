@@ -9,7 +9,6 @@ from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
@@ -18,6 +17,7 @@ from matplotlib.patches import Polygon
 from matplotlib.patheffects import AbstractPathEffect
 from matplotlib.patheffects import Stroke as Casing
 
+from equimorph.array_types import Float
 from equimorph.model import ActuatorKind, Constraint, Drawing, Obstacle, Support, SupportKind
 from equimorph.plotting import style
 from equimorph.plotting.labels import with_unit

@@ -6,11 +6,11 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from jaxtyping import UInt8
 from matplotlib.axes import Axes
 from matplotlib.colors import to_rgb
 from matplotlib.image import AxesImage
 
+from equimorph.array_types import UInt8
 from equimorph.plotting import style
 from equimorph.plotting.depth import View, depth_buffer
 from equimorph.plotting.scene import SAMPLES, downsample

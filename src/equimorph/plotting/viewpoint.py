@@ -4,9 +4,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Float
 from matplotlib.axes import Axes
 
+from equimorph.array_types import Float
 from equimorph.model import Actuator, Drawing, Forces, Support
 from equimorph.plotting import style
 from equimorph.structures import Structure

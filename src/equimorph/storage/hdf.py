@@ -17,8 +17,8 @@ from typing import Any
 
 import h5py
 import numpy as np
-from jaxtyping import Shaped
 
+from equimorph.array_types import Shaped
 from equimorph.errors import InputError
 from equimorph.linalg.lanes import in_background
 from equimorph.storage.files import replacing

@@ -5,9 +5,9 @@ from typing import Any
 
 import h5py
 import numpy as np
-from jaxtyping import Float, Int
 
 from equimorph.argument_checks import check_arguments
+from equimorph.array_types import Float, Int
 from equimorph.model import Grid
 from equimorph.storage.files import write_csv
 from equimorph.storage.hdf import get, get_json, put, put_coordinate, put_json, put_parameters

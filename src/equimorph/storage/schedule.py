@@ -16,9 +16,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
 
 from equimorph.argument_checks import check_arguments
+from equimorph.array_types import Float
 from equimorph.errors import InputError
 from equimorph.model import Schedule
 from equimorph.model.schedule import DERIVATIVES, MARGIN, PROGRESS, TIME

@@ -10,8 +10,8 @@ from typing import Any
 
 import h5py
 import numpy as np
-from jaxtyping import Float, Int
 
+from equimorph.array_types import Float, Int
 from equimorph.errors import InputError
 from equimorph.manifold import Boundary, BoundaryKind, EquilibriumSet
 from equimorph.manifold.complex.base_mesh import BaseMesh

@@ -8,9 +8,9 @@ VTK XML formats, https://docs.vtk.org/en/latest/vtk_file_formats/.
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Int, Shaped
 
 from equimorph.argument_checks import check_arguments
+from equimorph.array_types import Int, Shaped
 from equimorph.errors import InputError
 from equimorph.model import names_of
 from equimorph.storage.files import write_bytes

@@ -13,9 +13,9 @@ from typing import NamedTuple
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
-from jaxtyping import Float, Int, Shaped
 
 from equimorph.argument_checks import check_arguments
+from equimorph.array_types import Float, Int, Shaped
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Descriptor

@@ -1,8 +1,8 @@
 """Distance between a structure and an obstacle, and the place where it is smallest."""
 
 import numpy as np
-from jaxtyping import Float
 
+from equimorph.array_types import Float
 from equimorph.arrays import Values
 from equimorph.model.obstacle import Obstacle
 

@@ -12,9 +12,9 @@ from functools import cached_property
 from typing import Any, ClassVar, Self
 
 import numpy as np
-from jaxtyping import Float, Int
 
 from equimorph.argument_checks import check_arguments
+from equimorph.array_types import Float, Int
 from equimorph.arrays import Flags, Lanes, Parameters, Values
 from equimorph.errors import InputError, MissingError, suggestion
 from equimorph.html_tables import html_table

@@ -6,9 +6,9 @@ from dataclasses import fields
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Float
 
 from equimorph.argument_checks import check_arguments
+from equimorph.array_types import Float
 from equimorph.arrays import Entries, Flags, Lanes, Parameters, Values
 from equimorph.errors import InputError
 from equimorph.linalg.lanes import over_lanes

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-from jaxtyping import Float, Int
 
+from equimorph.array_types import Float, Int
 from equimorph.arrays import Lanes, Parameters, Sides, Values
 from equimorph.linalg import Border, BorderedSolution
 

@@ -4,8 +4,8 @@ from collections.abc import Callable, Iterator, Sequence
 from itertools import product
 
 import numpy as np
-from jaxtyping import Float, Int
 
+from equimorph.array_types import Float, Int
 from equimorph.arrays import Lanes, Parameters
 from equimorph.structures.contract import Structure
 from equimorph.tolerances import SAME_NUMBER

@@ -8,9 +8,9 @@ from itertools import pairwise
 from typing import Annotated, Any, ClassVar, TypeVar
 
 import numpy as np
-from jaxtyping import Float, Int
 
 from equimorph.argument_notes import NAME
+from equimorph.array_types import Float, Int
 from equimorph.errors import InputError, suggestion
 from equimorph.structures.unit_system import Quantity, UnitSystem
 

@@ -7,9 +7,9 @@ from functools import cached_property
 from typing import Any, Protocol, overload, runtime_checkable
 
 import numpy as np
-from jaxtyping import Float, Int
 
 from equimorph.argument_checks import check_arguments
+from equimorph.array_types import Float, Int
 from equimorph.arrays import Flags, Lanes, Parameters, Values
 from equimorph.errors import InputError, MissingError
 from equimorph.html_tables import html_table

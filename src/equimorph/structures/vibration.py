@@ -7,8 +7,8 @@ matrix M of `Structure.inertia`.
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
 
+from equimorph.array_types import Float
 from equimorph.arrays import Lanes, Parameters
 from equimorph.errors import InputError
 from equimorph.structures.contract import Structure

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
-from jaxtyping import Float
 from pydantic import BeforeValidator, PlainSerializer, PlainValidator, WithJsonSchema
 
+from equimorph.array_types import Float
 from equimorph.errors import InputError
 from equimorph.model import Schedule
 from equimorph.storage import read_schedule

@@ -8,8 +8,8 @@ from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Float
 
+from equimorph.array_types import Float
 from equimorph.arrays import Values
 from equimorph.model import Box, Constraint, Descriptor
 from equimorph.plotting.viewpoint import flat_shapes

@@ -6,9 +6,9 @@ from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Int
 
 from equimorph import plotting
+from equimorph.array_types import Int
 from equimorph.explorer import explore
 from equimorph.manifold import EquilibriumSet, SnapGraph
 from equimorph.model import Descriptor, Progress

@@ -1,8 +1,8 @@
 """Distances of states in the structure's metric, along paths and between candidates."""
 
 import numpy as np
-from jaxtyping import Float, Int
 
+from equimorph.array_types import Float, Int
 from equimorph.arrays import Values
 from equimorph.equilibria.settle import distances
 from equimorph.structures import State, States

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from jaxtyping import Float, Int
 from scipy.stats import chi2 as chi_squared
 
 from equimorph.argument_checks import check_arguments
+from equimorph.array_types import Float, Int
 from equimorph.arrays import Flags, Values
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
-from jaxtyping import Float
 
+from equimorph.array_types import Float
 from equimorph.equilibria import Event, Landing, Path, TraceOptions, lift, lift_legs
 from equimorph.errors import InputError
 from equimorph.html_tables import html_table

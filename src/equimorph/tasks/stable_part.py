@@ -6,8 +6,8 @@ from typing import Any
 from weakref import WeakKeyDictionary
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
 
+from equimorph.array_types import Bool, Float, Int
 from equimorph.manifold import EquilibriumSet, part, restricted
 from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.geometry.topology import faces_of

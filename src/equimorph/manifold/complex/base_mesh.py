@@ -3,8 +3,8 @@
 from dataclasses import dataclass, field
 
 import numpy as np
-from jaxtyping import Float, Int
 
+from equimorph.array_types import Float, Int
 from equimorph.arrays import Cells, EdgeFlags, ItemFlags, Place, Places
 from equimorph.manifold.geometry.simplices import barycentric
 from equimorph.manifold.geometry.topology import keys_of, rows_of

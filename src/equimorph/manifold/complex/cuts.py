@@ -4,8 +4,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
 
+from equimorph.array_types import Bool, Float, Int
 from equimorph.arrays import EdgeFlags, ItemFlags, Items, ItemValues, Pairs, Some, VertexFlags
 from equimorph.manifold.complex.edge_points import Places, on_edges
 from equimorph.manifold.complex.marked_complex import Fabric, edges_of

@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
 
+from equimorph.array_types import Bool, Float, Int
 from equimorph.arrays import ItemFlags, Items, ItemValues, Pairs, Some
 from equimorph.equilibria.settle import lower_index
 from equimorph.linalg.lanes import results_of

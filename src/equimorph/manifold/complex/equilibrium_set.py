@@ -6,9 +6,9 @@ from enum import StrEnum
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Float, Int
 
 from equimorph.argument_checks import check_arguments
+from equimorph.array_types import Float, Int
 from equimorph.arrays import CellNumbers, Cells, Flags, Numbers, VertexNumbers
 from equimorph.errors import InputError
 from equimorph.html_tables import html_table

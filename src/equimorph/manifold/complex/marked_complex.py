@@ -11,8 +11,8 @@ from functools import partial
 from itertools import combinations
 
 import numpy as np
-from jaxtyping import Float, Int
 
+from equimorph.array_types import Float, Int
 from equimorph.arrays import (
     CellFlags,
     CellNumbers,

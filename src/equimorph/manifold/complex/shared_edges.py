@@ -3,8 +3,8 @@
 from dataclasses import replace
 
 import numpy as np
-from jaxtyping import Bool, Int
 
+from equimorph.array_types import Bool, Int
 from equimorph.manifold.complex.marked_complex import Fabric, FacetMark, edges_of
 from equimorph.manifold.complex.vertices import Vertices, vertices_of
 from equimorph.manifold.geometry.topology import keys_of

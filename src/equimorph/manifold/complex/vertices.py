@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from jaxtyping import Float
 
+from equimorph.array_types import Float
 from equimorph.arrays import ItemFlags, VertexNumbers
 from equimorph.columns import Columns
 from equimorph.manifold.geometry.crossings import crossing_frames

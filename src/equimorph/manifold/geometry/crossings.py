@@ -11,8 +11,8 @@ vanishes.
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
 
+from equimorph.array_types import Float
 from equimorph.arrays import Frames, Lanes, Parameters, Rows, Values
 from equimorph.equilibria.critical import Critical, null_border
 from equimorph.equilibria.settle import free_directions

@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
-from jaxtyping import Float
 
+from equimorph.array_types import Float
 from equimorph.arrays import Flags, Frames, Lanes, Numbers, Parameters, Rows, Values
 from equimorph.columns import Columns
 from equimorph.equilibria.critical import null_border

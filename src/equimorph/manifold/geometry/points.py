@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from enum import IntEnum
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
 
+from equimorph.array_types import Bool, Float, Int
 from equimorph.arrays import Some
 from equimorph.manifold.geometry.kernels import match_or_add
 from equimorph.structures import Structure

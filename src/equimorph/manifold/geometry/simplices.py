@@ -1,8 +1,8 @@
 """Geometry of simplices in the space of the free parameters, in one to three dimensions."""
 
 import numpy as np
-from jaxtyping import Float
 
+from equimorph.array_types import Float
 from equimorph.arrays import ItemValues, Place, Places
 
 

@@ -4,10 +4,10 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from equimorph.array_types import Bool, Float, Int
 from equimorph.arrays import (
     CellFlags,
     CellNumbers,

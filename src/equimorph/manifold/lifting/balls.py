@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
 
+from equimorph.array_types import Bool, Float, Int
 from equimorph.arrays import Items
 from equimorph.manifold.complex.base_mesh import BaseMesh
 from equimorph.manifold.geometry.exact_points import Pinned, Span, middles, pin, pin_crossings

@@ -4,8 +4,8 @@ from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
 
+from equimorph.array_types import Bool, Float, Int
 from equimorph.arrays import CellNumbers, Facets, Items
 from equimorph.manifold.complex.description import Complex, Frame, Lifting, describe
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet

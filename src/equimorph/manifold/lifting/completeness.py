@@ -8,8 +8,8 @@ See docs/decisions.md, "Random checks are also the last seeds".
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Int
 
+from equimorph.array_types import Float, Int
 from equimorph.arrays import Lanes
 from equimorph.equilibria import search_points
 from equimorph.equilibria.random_search import Ground, Pools

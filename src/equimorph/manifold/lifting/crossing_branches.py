@@ -5,8 +5,8 @@ lifted in a step that did not notice the crossing, it is traced again in finer s
 """
 
 import numpy as np
-from jaxtyping import Float, Int
 
+from equimorph.array_types import Float, Int
 from equimorph.arrays import Items
 from equimorph.equilibria import ParameterLine, TraceOptions
 from equimorph.equilibria.critical import null_border

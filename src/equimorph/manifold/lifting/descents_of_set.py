@@ -8,8 +8,8 @@ from collections.abc import Container
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Int
 
+from equimorph.array_types import Float, Int
 from equimorph.arrays import Some
 from equimorph.equilibria.descents import descend
 from equimorph.equilibria.gradient_flow import Ending

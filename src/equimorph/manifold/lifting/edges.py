@@ -6,8 +6,8 @@ A fold on a traced edge becomes a vertex of the set, exactly as the trace locate
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
 
+from equimorph.array_types import Bool, Float, Int
 from equimorph.arrays import Flags, ItemFlags, Items, Lanes, Numbers
 from equimorph.equilibria import Guards, ParameterLine, TraceOptions, settle
 from equimorph.equilibria.curves import squared_length

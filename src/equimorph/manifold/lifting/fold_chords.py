@@ -9,8 +9,8 @@ that are joined between them, by a neck that is smaller than the triangle.
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
 
+from equimorph.array_types import Bool, Float, Int
 from equimorph.arrays import Flags, Pairs, Parameters, Places, Some, Values
 from equimorph.columns import Columns
 from equimorph.manifold.geometry.exact_points import pin

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field, replace
 from itertools import permutations
 
 import numpy as np
-from jaxtyping import Float, Int
 
+from equimorph.array_types import Float, Int
 from equimorph.arrays import Items, Place, Some
 from equimorph.manifold.complex.base_mesh import BaseMesh, mesh_of
 from equimorph.model import Box

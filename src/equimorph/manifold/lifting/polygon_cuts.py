@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
 
+from equimorph.array_types import Bool, Float, Int
 from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.simplices import plane_bases
 from equimorph.manifold.lifting.loops import Polygon

@@ -1,8 +1,8 @@
 """First equilibria over a few grid vertices, from which the set is flooded."""
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
 
+from equimorph.array_types import Bool, Float, Int
 from equimorph.arrays import Items, Places, Some
 from equimorph.equilibria import Guards, ParameterLine, TraceOptions, search_points, settle
 from equimorph.equilibria.kernels import MULTIPLIER_WEIGHT

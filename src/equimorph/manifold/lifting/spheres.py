@@ -6,10 +6,10 @@ And the regions of closed ones between folds, with the points from which they ar
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from equimorph.array_types import Bool, Float, Int
 from equimorph.arrays import ItemFlags, Items, Pairs, Triples
 from equimorph.manifold.complex.base_mesh import BaseMesh
 from equimorph.manifold.geometry.simplices import volumes

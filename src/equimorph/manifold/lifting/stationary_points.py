@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from itertools import combinations_with_replacement, product
 
 import numpy as np
-from jaxtyping import Float, Int
 
+from equimorph.array_types import Float, Int
 from equimorph.arrays import Flags, Lanes, Parameters, Places, Some, Values
 from equimorph.columns import Columns
 from equimorph.equilibria.critical import null_border

@@ -6,8 +6,8 @@ See docs/decisions.md, "Approaching sheets are followed to where they are neares
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from jaxtyping import Bool, Float
 
+from equimorph.array_types import Bool, Float
 from equimorph.arrays import CellFlags, Place, Some
 from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.setting import Setting

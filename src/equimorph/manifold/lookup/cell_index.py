@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
 
+from equimorph.array_types import Bool, Float, Int
 from equimorph.arrays import Items, Place, Places
 from equimorph.columns import Columns
 from equimorph.manifold.geometry.simplices import volumes

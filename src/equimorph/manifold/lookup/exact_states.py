@@ -1,9 +1,9 @@
 """Exact states at given parameters: by Newton from guesses, or along straight moves; guesses."""
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
 from scipy.spatial.distance import cdist
 
+from equimorph.array_types import Bool, Float, Int
 from equimorph.arrays import Flags, Lanes, Numbers, Some
 from equimorph.equilibria import ParameterLine, TraceOptions
 from equimorph.equilibria.trace import trace

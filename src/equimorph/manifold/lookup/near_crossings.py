@@ -15,9 +15,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Float, Int
 from numpy.polynomial import chebyshev, legendre
 
+from equimorph.array_types import Float, Int
 from equimorph.arrays import Cells, Facets, Flags, ItemValues, Lanes, Numbers, Places, Values
 from equimorph.columns import Columns
 from equimorph.equilibria.critical import Critical, null_border

@@ -5,9 +5,9 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Float, Int
 
 from equimorph.argument_checks import check_arguments
+from equimorph.array_types import Float, Int
 from equimorph.errors import InputError
 from equimorph.manifold.complex.equilibrium_set import Component, EquilibriumSet
 from equimorph.manifold.queries.levels import cell_sizes, part, restricted

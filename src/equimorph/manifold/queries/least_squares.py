@@ -9,8 +9,8 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Bool, Float
 
+from equimorph.array_types import Bool, Float
 from equimorph.arrays import Flags, Lanes, Numbers, Parameters, Some, Values
 from equimorph.columns import Columns
 from equimorph.manifold.geometry.setting import Setting

@@ -4,9 +4,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Float, Int
 
 from equimorph.argument_checks import check_arguments
+from equimorph.array_types import Float, Int
 from equimorph.arrays import CellFlags, CellNumbers, ItemFlags, Items, VertexFlags
 from equimorph.errors import InputError
 from equimorph.manifold.complex.cuts import (

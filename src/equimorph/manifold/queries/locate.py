@@ -4,9 +4,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Int
 
 from equimorph.argument_checks import check_arguments
+from equimorph.array_types import Float, Int
 from equimorph.arrays import Flags, Lanes, Parameters
 from equimorph.errors import InputError
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
 
+from equimorph.array_types import Float
 from equimorph.arrays import Flags, Items, Lanes, Pairs, Parameters, Rows, Some
 from equimorph.columns import Columns
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet

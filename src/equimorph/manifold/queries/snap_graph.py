@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from jaxtyping import Int
 
 from equimorph.argument_checks import check_arguments
+from equimorph.array_types import Int
 from equimorph.arrays import Facets, ItemFlags, Items
 from equimorph.equilibria import Landing, snap_landing
 from equimorph.errors import InputError

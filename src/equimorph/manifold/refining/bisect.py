@@ -5,8 +5,8 @@ tongue between them, the prediction fails: then the curve is followed from one e
 """
 
 import numpy as np
-from jaxtyping import Int
 
+from equimorph.array_types import Int
 from equimorph.arrays import EdgeFlags, Flags, ItemFlags, Items, Pairs, Values
 from equimorph.equilibria.critical import Critical, Test
 from equimorph.equilibria.critical_tests import gap

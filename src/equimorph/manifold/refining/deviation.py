@@ -5,8 +5,8 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
-from jaxtyping import Float, Int
 
+from equimorph.array_types import Float, Int
 from equimorph.arrays import EdgeFlags, Items, ItemValues, Pairs, VertexFlags
 from equimorph.linalg.lanes import results_of
 from equimorph.manifold.complex.edge_points import chunks

@@ -11,8 +11,8 @@ from functools import cache
 from itertools import combinations
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
 
+from equimorph.array_types import Bool, Float, Int
 from equimorph.arrays import Cells, Edges, ItemFlags, Items, ItemValues, Pairs, VertexFlags
 from equimorph.columns import Columns
 from equimorph.manifold.complex.marked_complex import (

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
-from jaxtyping import Int
 
+from equimorph.array_types import Int
 from equimorph.arrays import VertexFlags
 from equimorph.manifold.complex.marked_complex import Fabric, FacetMark
 from equimorph.manifold.geometry.topology import count_corners

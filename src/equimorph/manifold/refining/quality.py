@@ -13,8 +13,8 @@ run side by side over a long way. Such triangles are called squeezed.
 from itertools import combinations
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
 
+from equimorph.array_types import Bool, Float, Int
 from equimorph.arrays import CellFlags, Cells, Items, VertexFlags
 from equimorph.manifold.complex.marked_complex import (
     CURVES,

@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from jaxtyping import Bool, Float
 
+from equimorph.array_types import Bool, Float
 from equimorph.arrays import Edges, VertexFlags
 from equimorph.manifold.complex.marked_complex import TETRAHEDRA, TRIANGLES, Fabric
 from equimorph.manifold.geometry.topology import among, keys_of, rows_of

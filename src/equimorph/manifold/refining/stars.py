@@ -5,8 +5,8 @@ from enum import Enum
 from itertools import combinations
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
 
+from equimorph.array_types import Bool, Float, Int
 from equimorph.arrays import Cells, Edges, ItemFlags, Items
 from equimorph.manifold.complex.marked_complex import TRIANGLES, Fabric, squared_sides
 from equimorph.manifold.geometry.topology import among, count_corners, distinct, keys_of

@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 from itertools import combinations, product
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
 
+from equimorph.array_types import Bool, Float, Int
 from equimorph.arrays import Edges, ItemFlags, Places, VertexFlags
 from equimorph.manifold.complex.edge_points import chunks, of_index, on_curves, vertices_at
 from equimorph.manifold.complex.marked_complex import (

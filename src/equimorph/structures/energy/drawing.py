@@ -5,10 +5,10 @@ from dataclasses import dataclass
 from typing import Annotated, Any
 
 import numpy as np
-from jaxtyping import Bool, Float
 
 from equimorph.argument_kinds import is_number, one_of, short
 from equimorph.argument_vocabulary import FINITE
+from equimorph.array_types import Bool, Float
 from equimorph.errors import InputError
 from equimorph.model import Drawing, Forces, Support, SupportKind
 from equimorph.structures.energy.expressions import POINT

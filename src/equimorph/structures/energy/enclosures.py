@@ -7,8 +7,8 @@ Every result is widened by rounding errors outward, so that it encloses the exac
 from collections.abc import Callable
 
 import numpy as np
-from jaxtyping import Float
 
+from equimorph.array_types import Float
 from equimorph.arrays import Values
 from equimorph.structures.energy.kernels import OPERATIONS
 from equimorph.structures.energy.tape import Tape

@@ -9,8 +9,8 @@ meet at infinity: no equilibrium is there.
 from collections.abc import Callable
 
 import numpy as np
-from jaxtyping import Float, Int
 
+from equimorph.array_types import Float, Int
 from equimorph.arrays import Entries, Lanes, Parameters, Values
 
 DEPENDENT = 0.02

@@ -3,8 +3,8 @@
 from collections.abc import Mapping
 
 import numpy as np
-from jaxtyping import Float, Int
 
+from equimorph.array_types import Float, Int
 from equimorph.structures.energy.kernels import OPERATIONS
 from equimorph.structures.energy.tape import Tape
 

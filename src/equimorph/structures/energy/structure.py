@@ -6,9 +6,9 @@ from functools import cached_property
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
-from jaxtyping import Bool, Float
 
 from equimorph.argument_checks import check_arguments
+from equimorph.array_types import Bool, Float
 from equimorph.arrays import Flags, Lanes, Parameters, Values
 from equimorph.errors import InputError
 from equimorph.linalg.sparse import SparseLayout

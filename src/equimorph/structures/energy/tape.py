@@ -6,8 +6,8 @@ from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float, Int
 
+from equimorph.array_types import Float, Int
 from equimorph.errors import InputError
 from equimorph.linalg.lanes import over_lanes
 from equimorph.linalg.sparse import SparseLayout

@@ -6,9 +6,9 @@ from functools import cached_property
 from typing import Any, ClassVar, NamedTuple, NoReturn
 
 import numpy as np
-from jaxtyping import Float
 from numpy.polynomial import legendre
 
+from equimorph.array_types import Float
 from equimorph.arrays import Lanes, Parameters, Values
 from equimorph.errors import InputError
 from equimorph.linalg.sparse import SparseLayout

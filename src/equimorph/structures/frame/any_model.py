@@ -6,8 +6,8 @@ from functools import cached_property
 from typing import Any, TypeVar
 
 import numpy as np
-from jaxtyping import Float, Int
 
+from equimorph.array_types import Float, Int
 from equimorph.structures.frame.any_network import AnyFrameNetwork
 from equimorph.structures.frame.patterns import Patterns, patterns
 from equimorph.structures.rod.discretisation import Mesh, reference_element

@@ -4,10 +4,10 @@ from collections.abc import Iterable, Mapping
 from typing import Annotated
 
 import numpy as np
-from jaxtyping import Float
 
 from equimorph.argument_checks import check_arguments
 from equimorph.argument_vocabulary import count
+from equimorph.array_types import Float
 from equimorph.arrays import Lanes, Parameters
 from equimorph.structures.contract import Symmetry
 from equimorph.structures.frame.described import DescribedFrame

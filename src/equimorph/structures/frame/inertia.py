@@ -1,8 +1,8 @@
 """The mass of a frame."""
 
 import numpy as np
-from jaxtyping import Float
 
+from equimorph.array_types import Float
 from equimorph.arrays import Lanes, Parameters
 from equimorph.model.units import STANDARD_GRAVITY
 from equimorph.structures.frame.fields import FrameFields

@@ -4,8 +4,8 @@ from functools import cached_property
 from typing import ClassVar, NamedTuple
 
 import numpy as np
-from jaxtyping import Float, Int
 
+from equimorph.array_types import Float, Int
 from equimorph.arrays import Entries, Flags, Lanes, Nodal, Parameters, Scalars, Values
 from equimorph.linalg.dense import multiply
 from equimorph.linalg.sparse import SparseLayout

@@ -6,8 +6,8 @@ from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
-from jaxtyping import Bool, Float
 
+from equimorph.array_types import Bool, Float
 from equimorph.errors import InputError
 from equimorph.structures.frame.any_network import WEIGHT, AnyFrameNetwork
 from equimorph.structures.frame.member import (

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from typing import Annotated, Any
 
 import numpy as np
-from jaxtyping import Bool, Float
 
 from equimorph.argument_kinds import is_listed, is_number, one_of
+from equimorph.array_types import Bool, Float
 from equimorph.errors import InputError
 from equimorph.structures.frame.any_network import WEIGHT, AnyFrameNetwork
 from equimorph.structures.network import check_parameter_names, vector

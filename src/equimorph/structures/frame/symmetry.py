@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
 
+from equimorph.array_types import Bool, Float, Int
 from equimorph.arrays import Lanes, Parameters
 from equimorph.linalg.dense import multiply
 from equimorph.structures.contract import Symmetry

@@ -7,10 +7,10 @@ from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
-from jaxtyping import Float, Int
 
 from equimorph.argument_checks import check_arguments
 from equimorph.argument_vocabulary import SHARE
+from equimorph.array_types import Float, Int
 from equimorph.arrays import Flags, Lanes, Parameters, Sides, Values
 from equimorph.errors import InputError, suggestion
 from equimorph.linalg import BorderedSolution

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from functools import cached_property, partial
 
 import numpy as np
-from jaxtyping import Float
 
+from equimorph.array_types import Float
 from equimorph.arrays import Lanes, Nodal, Parameters, Sides, Values
 from equimorph.linalg import BorderedSolution, CondensedLayout, multiply, no_border
 from equimorph.linalg.lanes import over_lanes

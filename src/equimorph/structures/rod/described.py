@@ -5,9 +5,9 @@ from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
-from jaxtyping import Int
 
 from equimorph.argument_checks import check_arguments
+from equimorph.array_types import Int
 from equimorph.arrays import Lanes, Parameters, Values
 from equimorph.errors import InputError, MissingError
 from equimorph.model import Constraint, Descriptor, remember_call

@@ -7,10 +7,10 @@ from itertools import pairwise
 from typing import Annotated
 
 import numpy as np
-from jaxtyping import Float, Int
 from numpy.polynomial import legendre
 
 from equimorph.argument_vocabulary import count
+from equimorph.array_types import Float, Int
 from equimorph.arrays import Lanes, Values
 
 REFINING = 6

@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 
 import numpy as np
-from jaxtyping import Float
 
+from equimorph.array_types import Float
 from equimorph.arrays import Lanes, Parameters, Values
 from equimorph.model import Actuator, ActuatorKind, Couples, Drawing, Forces, Support
 from equimorph.model.drawing import supports_of_point

@@ -4,8 +4,8 @@ from collections.abc import Callable
 from typing import TypeVar
 
 import numpy as np
-from jaxtyping import Float
 
+from equimorph.array_types import Float
 from equimorph.arrays import Lanes, Parameters, Values
 from equimorph.structures.rod.discretisation import error_by_refinement
 from equimorph.structures.rod.mechanics import RodMechanics

@@ -3,9 +3,9 @@
 from functools import lru_cache
 
 import numpy as np
-from jaxtyping import Float, Int
 from numpy.polynomial import legendre
 
+from equimorph.array_types import Float, Int
 from equimorph.arrays import Lanes, Parameters
 from equimorph.structures.rod.discretisation import Mesh, reference_element
 from equimorph.structures.rod.mechanics import PlanarMechanics

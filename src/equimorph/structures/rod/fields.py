@@ -4,9 +4,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Float, Int
 from numpy.polynomial import legendre, polynomial
 
+from equimorph.array_types import Float, Int
 from equimorph.arrays import Lanes, Parameters, Scalars, Values
 from equimorph.linalg.lanes import over_lanes
 from equimorph.structures.rod import clamped_field_kernels, general_field_kernels

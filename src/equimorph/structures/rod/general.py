@@ -3,8 +3,8 @@
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Float
 
+from equimorph.array_types import Float
 from equimorph.arrays import Flags, Lanes, Nodal, Parameters, Scalars, Sides, Values
 from equimorph.linalg import BorderedSolution, CondensedLayout, no_border
 from equimorph.linalg.lanes import over_lanes

@@ -8,8 +8,8 @@ Cross-sections have no rotary inertia, as is right for slender rods.
 from functools import lru_cache
 
 import numpy as np
-from jaxtyping import Float
 
+from equimorph.array_types import Float
 from equimorph.arrays import Nodal, Scalars
 from equimorph.structures.rod.discretisation import Mesh
 from equimorph.structures.rod.model import RodModel

@@ -1,8 +1,8 @@
 """Planar rods as structures: fields along the rod in the user's units."""
 
 import numpy as np
-from jaxtyping import Float
 
+from equimorph.array_types import Float
 from equimorph.arrays import Lanes, Parameters, Values
 from equimorph.structures.rod.any_rod import AnyRod, Arclengths
 from equimorph.structures.rod.centreline import Centreline

@@ -5,8 +5,8 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
 
+from equimorph.array_types import Float
 from equimorph.arrays import Flags, Lanes, Nodal, Parameters, Values
 from equimorph.errors import InputError
 from equimorph.linalg.condensed import PIVOT_GUARD

@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
 
+from equimorph.array_types import Bool, Float, Int
 from equimorph.structures.rod.discretisation import Mesh, reference_element
 from equimorph.structures.rod.ends import FREE, HELD, Axis, End, support_axes
 from equimorph.structures.rod.lagrangian import RodLagrangian

@@ -6,9 +6,9 @@ from enum import IntEnum
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
 from numpy.polynomial import legendre
 
+from equimorph.array_types import Bool, Float, Int
 from equimorph.arrays import Flags, Lanes, Parameters, Values
 from equimorph.structures.newton import Limits, Steps, Through, newton
 from equimorph.structures.rod.discretisation import reference_element

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Float, Int
 
+from equimorph.array_types import Float, Int
 from equimorph.arrays import Entries, Nodal, Values
 from equimorph.linalg.dense import multiply
 from equimorph.structures.rod.discretisation import Mesh

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from typing import Annotated, Any
 
 import numpy as np
-from jaxtyping import Float
 
 from equimorph.argument_kinds import one_of
+from equimorph.array_types import Float
 from equimorph.errors import InputError
 from equimorph.structures.rod.discretisation import Mesh
 from equimorph.structures.unit_system import Quantity

@@ -10,8 +10,8 @@ from functools import partial
 from itertools import product
 
 import numpy as np
-from jaxtyping import Float
 
+from equimorph.array_types import Float
 from equimorph.arrays import Lanes, Parameters
 from equimorph.structures.contract import Symmetry
 from equimorph.structures.rod.lagrangian import RodLagrangian

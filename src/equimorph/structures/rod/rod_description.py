@@ -7,8 +7,8 @@ from functools import cached_property
 from typing import Any, ClassVar, TypeVar
 
 import numpy as np
-from jaxtyping import Float
 
+from equimorph.array_types import Float
 from equimorph.arrays import Parameters, Values
 from equimorph.errors import InputError, suggestion
 from equimorph.model import Parameter, names_of

@@ -4,8 +4,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
 
+from equimorph.array_types import Float
 from equimorph.structures.rod.ends import FREE, Axis, compliance
 
 Rows = Float[np.ndarray, "axes scalars"]

@@ -3,8 +3,8 @@
 from functools import partial
 
 import numpy as np
-from jaxtyping import Float
 
+from equimorph.array_types import Float
 from equimorph.arrays import Lanes
 from equimorph.structures.contract import Symmetry
 from equimorph.structures.rod.model import RodModel

@@ -6,10 +6,10 @@ from dataclasses import dataclass, fields
 from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
-from jaxtyping import Float
 
 from equimorph.argument_checks import check_arguments
 from equimorph.argument_notes import LOAD_DIRECTION
+from equimorph.array_types import Float
 from equimorph.errors import InputError
 from equimorph.model import Rebuilt
 from equimorph.structures.rod.discretisation import Mesh

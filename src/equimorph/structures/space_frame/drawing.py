@@ -1,8 +1,8 @@
 """Symbols of the supports of a frame in space."""
 
 import numpy as np
-from jaxtyping import Float
 
+from equimorph.array_types import Float
 from equimorph.model import Support, SupportKind
 from equimorph.structures.space_frame.network import SpatialNetwork
 from equimorph.structures.space_frame.supports import SpatialSupport

@@ -4,8 +4,8 @@ from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
-from jaxtyping import Float
 
+from equimorph.array_types import Float
 from equimorph.arrays import Lanes, Parameters
 from equimorph.model import Support
 from equimorph.structures.frame.any_frame import AnyFrame

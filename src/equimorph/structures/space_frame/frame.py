@@ -4,10 +4,10 @@ from collections.abc import Iterable, Mapping
 from typing import Annotated, ClassVar
 
 import numpy as np
-from jaxtyping import Float
 
 from equimorph.argument_checks import check_arguments
 from equimorph.argument_vocabulary import count
+from equimorph.array_types import Float
 from equimorph.arrays import Flags, Lanes, Parameters
 from equimorph.structures.frame.patterns import Actuators, Loads
 from equimorph.structures.network import Joints

@@ -3,8 +3,8 @@
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Float
 
+from equimorph.array_types import Float
 from equimorph.arrays import Flags, Lanes, Parameters
 from equimorph.structures.discrete import STEPS, SURE
 from equimorph.structures.frame.patterns import Patterns

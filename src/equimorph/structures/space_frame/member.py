@@ -5,11 +5,11 @@ from dataclasses import dataclass, replace
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
-from jaxtyping import Float
 
 from equimorph.argument_checks import check_arguments
 from equimorph.argument_kinds import one_of
 from equimorph.argument_notes import SEVERAL_NAMES, SPACE_DIRECTION, THREE_QUANTITIES
+from equimorph.array_types import Float
 from equimorph.errors import InputError
 from equimorph.structures.network import Edge, arc_length, check_hinges
 from equimorph.structures.rod.sections import CrossSection, cross_section

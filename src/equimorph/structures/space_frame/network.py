@@ -7,8 +7,8 @@ from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
-from jaxtyping import Float, Int
 
+from equimorph.array_types import Float, Int
 from equimorph.errors import InputError
 from equimorph.structures.frame.any_network import WEIGHT, AnyFrameNetwork
 from equimorph.structures.network import (

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 from typing import Annotated, Any
 
 import numpy as np
-from jaxtyping import Float
 
 from equimorph.argument_kinds import one_of
 from equimorph.argument_notes import SPACE_DIRECTION, positive_quantity
+from equimorph.array_types import Float
 from equimorph.errors import InputError
 from equimorph.structures.unit_system import UnitSystem
 

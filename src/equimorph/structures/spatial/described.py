@@ -4,9 +4,9 @@ from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
-from jaxtyping import Float
 
 from equimorph.argument_checks import check_arguments
+from equimorph.array_types import Float
 from equimorph.arrays import Lanes, Parameters, Values
 from equimorph.errors import InputError
 from equimorph.model import Descriptor, remember_call

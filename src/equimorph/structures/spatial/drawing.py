@@ -1,8 +1,8 @@
 """What to draw at the ends of a rod in space."""
 
 import numpy as np
-from jaxtyping import Float
 
+from equimorph.array_types import Float
 from equimorph.model import Support, SupportKind
 from equimorph.structures.rod.centreline import Centreline
 from equimorph.structures.rod.ends import HELD

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
 
+from equimorph.array_types import Float
 from equimorph.errors import InputError
 from equimorph.structures.rod import terms
 from equimorph.structures.rod.discretisation import Mesh

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Float
 from numpy.polynomial import legendre
 
+from equimorph.array_types import Float
 from equimorph.arrays import Lanes, Parameters, Values
 from equimorph.linalg.lanes import over_lanes
 from equimorph.structures.spatial.field_kernels import fields_lanes

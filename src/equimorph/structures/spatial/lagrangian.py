@@ -8,8 +8,8 @@ keeps lengths at 1, and is zero at equilibria. See docs/decisions.md, "Rotations
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
 
+from equimorph.array_types import Float
 from equimorph.arrays import Flags, Lanes, Parameters, Scalars, Values
 from equimorph.structures.contract import Symmetry
 from equimorph.structures.equations import Direction

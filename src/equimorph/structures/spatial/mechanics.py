@@ -3,8 +3,8 @@
 from functools import cached_property, partial
 
 import numpy as np
-from jaxtyping import Int
 
+from equimorph.array_types import Int
 from equimorph.arrays import Entries, Lanes, Parameters, Sides, Values
 from equimorph.linalg import BorderedSolution
 from equimorph.linalg.condensed import PIVOT_GUARD

@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Float
 
+from equimorph.array_types import Float
 from equimorph.structures.rod.discretisation import Mesh
 from equimorph.structures.rod.ends import FREE
 from equimorph.structures.rod.lagrangian import RodLagrangian

@@ -3,8 +3,8 @@
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
 
+from equimorph.array_types import Float
 from equimorph.arrays import Flags, Lanes, Parameters
 from equimorph.errors import InputError
 from equimorph.structures.rod.natural import Part, follow

@@ -15,8 +15,8 @@ from dataclasses import fields, replace
 from functools import cached_property, partial
 
 import numpy as np
-from jaxtyping import Float
 
+from equimorph.array_types import Float
 from equimorph.arrays import Flags, Lanes, Parameters, Sides, Values
 from equimorph.errors import InputError
 from equimorph.linalg import BorderedSolution

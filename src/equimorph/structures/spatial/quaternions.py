@@ -9,7 +9,8 @@ along v), or four (value, along v, along w, and the mixed second derivative).
 from collections.abc import Callable
 
 import numpy as np
-from jaxtyping import Float
+
+from equimorph.array_types import Float
 
 Quaternions = Float[np.ndarray, "... 4"]
 Jet = Float[np.ndarray, "parts ..."]

@@ -7,8 +7,8 @@ latter where M turns x round. Its strains are ± det(M) M u, its tangents ± M t
 from functools import partial
 
 import numpy as np
-from jaxtyping import Float
 
+from equimorph.array_types import Float
 from equimorph.arrays import Lanes
 from equimorph.structures.contract import Symmetry
 from equimorph.structures.rod.reflections import Images, Reflection, find_symmetries, is_equal

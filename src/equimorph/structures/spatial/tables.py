@@ -3,8 +3,8 @@
 from functools import cache
 
 import numpy as np
-from jaxtyping import Float, Int
 
+from equimorph.array_types import Float, Int
 from equimorph.structures.spatial.model import SpatialModel
 from equimorph.structures.spatial.quaternions import PAIRS
 

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
-from jaxtyping import Float
 
 from equimorph.argument_checks import check_arguments
 from equimorph.argument_notes import TWO_NAMES
+from equimorph.array_types import Float
 from equimorph.structures.network import Edge
 from equimorph.structures.unit_system import Quantity
 

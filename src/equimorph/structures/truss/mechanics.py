@@ -4,8 +4,8 @@ from functools import cached_property, partial
 from typing import ClassVar
 
 import numpy as np
-from jaxtyping import Float, Int
 
+from equimorph.array_types import Float, Int
 from equimorph.arrays import Entries, Flags, Lanes, Parameters, Values
 from equimorph.linalg.dense import multiply
 from equimorph.linalg.sparse import SparseLayout

@@ -5,9 +5,9 @@ from dataclasses import replace
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
-from jaxtyping import Float
 
 from equimorph.argument_checks import check_arguments
+from equimorph.array_types import Float
 from equimorph.arrays import Lanes, Parameters, Values
 from equimorph.errors import InputError
 from equimorph.model import Constraint, Descriptor, remember_call

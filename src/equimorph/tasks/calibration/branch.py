@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Float
 
+from equimorph.array_types import Float
 from equimorph.arrays import Lanes, Parameters
 from equimorph.equilibria import ParameterLine, TraceOptions, settle, trace
 from equimorph.equilibria.trace_options import EventCode

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from jaxtyping import Float
 from scipy.optimize import least_squares
 
 from equimorph.argument_checks import check_arguments
+from equimorph.array_types import Float
 from equimorph.equilibria import check_start
 from equimorph.errors import InputError
 from equimorph.structures import States

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 from typing import Annotated, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
-from jaxtyping import Float
 from numpy.typing import ArrayLike
 
 from equimorph.argument_checks import check_arguments
 from equimorph.argument_kinds import NUMBERS
+from equimorph.array_types import Float
 from equimorph.arrays import Lanes, Parameters
 from equimorph.errors import InputError
 from equimorph.model import Descriptor

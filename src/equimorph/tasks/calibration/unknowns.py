@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
 import numpy as np
-from jaxtyping import Float
 
 from equimorph.argument_checks import check_arguments
+from equimorph.array_types import Float
 from equimorph.arrays import Parameters
 from equimorph.errors import InputError
 from equimorph.model import Rebuilt, position

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
 
 from equimorph.argument_checks import check_arguments
+from equimorph.array_types import Bool, Float, Int
 from equimorph.equilibria.natural_sheet import NaturalSheet, natural_sheet
 from equimorph.errors import InputError
 from equimorph.html_tables import html_table

@@ -4,8 +4,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float, Int, Shaped
 
+from equimorph.array_types import Bool, Float, Int, Shaped
 from equimorph.arrays import Edges, Lanes, Parameters, Settings, Values
 from equimorph.columns import Columns
 from equimorph.structures import Structure

@@ -10,8 +10,8 @@ from enum import IntEnum
 from functools import partial
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
 
+from equimorph.array_types import Bool, Float, Int
 from equimorph.arrays import Edges, Flags, Lanes, Parameters, Settings, Values
 from equimorph.columns import Columns
 from equimorph.equilibria.critical import Critical, Test

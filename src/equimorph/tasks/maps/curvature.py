@@ -6,9 +6,9 @@ from enum import IntEnum
 from typing import ClassVar
 
 import numpy as np
-from jaxtyping import Bool
 
 from equimorph.argument_checks import check_arguments
+from equimorph.array_types import Bool
 from equimorph.arrays import Flags, Settings, Values
 from equimorph.equilibria import TraceOptions
 from equimorph.equilibria.critical import Critical

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
 
+from equimorph.array_types import Bool, Float, Int
 from equimorph.arrays import Settings
 from equimorph.columns import Columns
 from equimorph.equilibria.natural_sheet import NaturalSheet

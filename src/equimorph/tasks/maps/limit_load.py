@@ -6,9 +6,9 @@ from enum import IntEnum
 from typing import ClassVar
 
 import numpy as np
-from jaxtyping import Bool
 
 from equimorph.argument_checks import check_arguments
+from equimorph.array_types import Bool
 from equimorph.arrays import Edges, Flags, Lanes, Parameters, Settings, Values
 from equimorph.equilibria import LimitLoad, ParameterLine, TraceOptions, limit_load, trace
 from equimorph.equilibria.critical import Critical, null_border

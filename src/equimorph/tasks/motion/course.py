@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float, Int
 
+from equimorph.array_types import Float, Int
 from equimorph.arrays import Lanes, Parameters
 from equimorph.equilibria import Leg
 from equimorph.equilibria.legs import replace_parameters

@@ -9,8 +9,8 @@ is held there while the remaining actuators suffice.
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Float, Int
 
+from equimorph.array_types import Float, Int
 from equimorph.equilibria import Event, EventKind
 from equimorph.equilibria.settle import distances
 from equimorph.model import Constraint

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from jaxtyping import Float
 
+from equimorph.array_types import Float
 from equimorph.tasks.optimising.programme import Programme, is_stability
 from equimorph.tasks.optimising.sqp import LocalMinimum
 

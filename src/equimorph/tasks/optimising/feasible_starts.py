@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from itertools import combinations_with_replacement
 
 import numpy as np
-from jaxtyping import Float, Int
 
+from equimorph.array_types import Float, Int
 from equimorph.arrays import Cells, Flags, Lanes, Parameters
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.queries.nearest import SetPoints, points_at_vertices

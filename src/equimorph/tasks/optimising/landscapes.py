@@ -6,9 +6,9 @@ from functools import cached_property
 from typing import Literal
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
 
 from equimorph.argument_checks import check_arguments
+from equimorph.array_types import Bool, Float, Int
 from equimorph.arrays import Flags, Lanes, Values
 from equimorph.equilibria import ParameterLine, TraceOptions, trace
 from equimorph.equilibria.trace_options import EventCode

@@ -5,9 +5,9 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from jaxtyping import Bool
 
 from equimorph.argument_checks import check_arguments
+from equimorph.array_types import Bool
 from equimorph.equilibria import settle
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from jaxtyping import Float
 
+from equimorph.array_types import Float
 from equimorph.model import Schedule
 from equimorph.structures import State, States
 from equimorph.tasks.optimising.certificates import Certificate

@@ -5,7 +5,8 @@ from itertools import combinations
 from math import comb
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+
+from equimorph.array_types import Bool, Float, Int
 
 Vector = Float[np.ndarray, " d"]
 

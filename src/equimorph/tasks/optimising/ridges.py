@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
 
+from equimorph.array_types import Float
 from equimorph.arrays import Pair
 from equimorph.equilibria.critical import Critical, Test, null_border
 from equimorph.equilibria.critical_tests import bound, branching, gap, grazing, quadratic

@@ -6,8 +6,8 @@ See docs/decisions.md, "Optima come from an SQP method of this package".
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Float
 
+from equimorph.array_types import Float
 from equimorph.arrays import Frames
 from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.queries.nearest import SetPoints

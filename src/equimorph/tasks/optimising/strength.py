@@ -6,9 +6,9 @@ from itertools import product
 from typing import Literal
 
 import numpy as np
-from jaxtyping import Float
 
 from equimorph.argument_checks import check_arguments
+from equimorph.array_types import Float
 from equimorph.arrays import Flags, Settings, Values
 from equimorph.equilibria import LimitLoad
 from equimorph.errors import InputError

@@ -3,8 +3,8 @@
 from dataclasses import replace
 
 import numpy as np
-from jaxtyping import Float
 
+from equimorph.array_types import Float
 from equimorph.arrays import Flags, Frames, Lanes, Parameters, Rows
 from equimorph.equilibria.sensitivity import answers
 from equimorph.manifold import EquilibriumSet

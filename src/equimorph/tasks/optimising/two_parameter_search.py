@@ -4,8 +4,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
 
+from equimorph.array_types import Float
 from equimorph.arrays import Pair, Values
 from equimorph.model import Box
 from equimorph.tasks.optimising.quadratic import Quadratic, solve

@@ -8,10 +8,10 @@ know the order in which holes are passed.)
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import breadth_first_order, minimum_spanning_tree
 
+from equimorph.array_types import Bool, Float, Int
 from equimorph.arrays import Edges
 
 Triangles = Int[np.ndarray, "triangles 3"]

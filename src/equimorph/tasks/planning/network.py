@@ -4,10 +4,10 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components, dijkstra
 
+from equimorph.array_types import Bool, Float, Int
 from equimorph.arrays import Flags, Lanes, Parameters, Some, Values
 from equimorph.equilibria import ParameterLine, TraceOptions
 from equimorph.equilibria.soft_modes import metric_length

@@ -6,9 +6,9 @@ from functools import cached_property
 from typing import Annotated, Literal, get_args
 
 import numpy as np
-from jaxtyping import Float, Int
 
 from equimorph.argument_kinds import ANYTHING, short
+from equimorph.array_types import Float, Int
 from equimorph.errors import InputError, suggestion
 from equimorph.model import Rates, Schedule, names_of
 from equimorph.structures import States, Structure, stability_margin

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Int
 
+from equimorph.array_types import Float, Int
 from equimorph.arrays import Lanes, Parameters, Values
 from equimorph.model import Box, Constraint
 from equimorph.structures import State, States

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from heapq import heappop, heappush
 
 import numpy as np
-from jaxtyping import Float, Int
 
 from equimorph.argument_checks import check_arguments
+from equimorph.array_types import Float, Int
 from equimorph.arrays import Edges
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Constraint, Descriptor

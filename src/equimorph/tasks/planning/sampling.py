@@ -4,9 +4,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
 
 from equimorph.argument_checks import check_arguments
+from equimorph.array_types import Bool, Float, Int
 from equimorph.arrays import Values
 from equimorph.equilibria import way_points
 from equimorph.errors import InputError

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from jaxtyping import Int
 
+from equimorph.array_types import Int
 from equimorph.arrays import Lanes, Parameters, Values
 from equimorph.equilibria.sensitivity import steering
 from equimorph.errors import InputError

@@ -6,8 +6,8 @@ from functools import cached_property
 from typing import Literal
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
 
+from equimorph.array_types import Bool, Float, Int
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet, cell_sizes
 from equimorph.manifold.geometry.simplices import volumes

@@ -6,9 +6,9 @@ from itertools import product
 from typing import Literal
 
 import numpy as np
-from jaxtyping import Float, Int
 
 from equimorph.argument_checks import check_arguments
+from equimorph.array_types import Float, Int
 from equimorph.arrays import Parameters, Values
 from equimorph.equilibria import ParameterLine, TraceOptions, trace
 from equimorph.equilibria.legs import check_starts

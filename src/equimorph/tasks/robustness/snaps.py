@@ -4,9 +4,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from jaxtyping import Float
 
 from equimorph.argument_checks import check_arguments
+from equimorph.array_types import Float
 from equimorph.arrays import Flags, Lanes, Parameters, Some, Values
 from equimorph.equilibria import Landing, lift, snap_landing
 from equimorph.manifold import EquilibriumSet, StabilityDistance, stability_distance

@@ -6,9 +6,9 @@ from functools import cached_property
 from typing import Literal
 
 import numpy as np
-from jaxtyping import Bool, Float, Int, Shaped
 
 from equimorph.argument_checks import check_arguments
+from equimorph.array_types import Bool, Float, Int, Shaped
 from equimorph.arrays import Parameters, Values
 from equimorph.equilibria import lift, way_points
 from equimorph.errors import InputError

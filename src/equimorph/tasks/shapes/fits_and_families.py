@@ -1,9 +1,9 @@
 """Least-squares fits to too many targets, and families of solutions of too few."""
 
 import numpy as np
-from jaxtyping import Bool, Float
 from scipy.spatial import cKDTree
 
+from equimorph.array_types import Bool, Float
 from equimorph.arrays import Edges
 from equimorph.manifold import Level, level_set
 from equimorph.manifold.geometry.setting import embed

@@ -12,7 +12,8 @@ from itertools import product
 from math import factorial
 
 import numpy as np
-from jaxtyping import Float
+
+from equimorph.array_types import Float
 
 Instants = Float[np.ndarray, " instants"]
 Rows = Float[np.ndarray, "corners parameters"]

@@ -4,9 +4,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from jaxtyping import Float, Int
 
 from equimorph.argument_checks import check_arguments
+from equimorph.array_types import Float, Int
 from equimorph.errors import InputError
 from equimorph.model import Constraint, Rates, Schedule
 from equimorph.structures import State, Structure

@@ -12,8 +12,8 @@ See docs/decisions.md, "Proofs are componentwise".
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Int
 
+from equimorph.array_types import Float, Int
 from equimorph.arrays import Flags, Lanes, Parameters, Values
 from equimorph.columns import Columns
 from equimorph.structures import Direction, Majorant, States, Structure

@@ -5,8 +5,8 @@ from enum import StrEnum
 from typing import Literal
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
 
+from equimorph.array_types import Bool, Float, Int
 from equimorph.equilibria import settle
 from equimorph.structures import States, Structure
 from equimorph.tasks.verification.newton_kantorovich import Bounds, allows_sampling, segment_bounds
