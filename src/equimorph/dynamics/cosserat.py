@@ -7,8 +7,8 @@ joints lie between the centres of successive elements and bend as the rod does t
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
 
+from equimorph.array_types import Float
 from equimorph.arrays import Lanes, Parameters
 from equimorph.dynamics.direct import DirectModel
 from equimorph.dynamics.linkage import Linkage, Settings
