@@ -8,8 +8,8 @@
 
 import type { EquilibriumSet, Spot } from "./set";
 
-/** Most steps towards the parameters, how far weights may move, and when it is near enough, in shares of the box. */
-const STEPS = 6, FARTHEST = 0.3, NEAR = 1e-5;
+/** Most steps towards the parameters, how far weights may move in one and in all, and when it is near enough, in shares of the box. */
+const STEPS = 12, LONGEST = 0.25, FARTHEST = 1, NEAR = 1e-5;
 
 export class Curves {
   private readonly middles = new Map<number, number>();
@@ -44,16 +44,26 @@ export class Curves {
     return { cell: spot.cell, corners: [...spot.corners, ...middles.map(([, , state]) => state)], weights };
   }
 
+  /** Slopes of the parameters by the weights, where those of a straight cell are its corners. */
+  private slopes(places: number[][], bends: [number, number, number[]][], w: number[]): number[][] {
+    const out = places.map((place) => [...place]);
+    for (const [i, j, bend] of bends) bend.forEach((x, a) => { out[i][a] += w[j] * x; out[j][a] += w[i] * x; });
+    return out;
+  }
+
   private moved(spot: Spot, middles: [number, number, number][]): number[] {
     const { set } = this, wanted = set.parameters(spot), scale = set.words.parameters.map((each) => each.upper - each.lower);
+    const places = set.placesOf(spot.cell);
+    const bends = middles.map(([i, j, state]): [number, number, number[]] => [i, j, places[0].map((_, a) => 4 * set.place(state, a) - 2 * (places[i][a] + places[j][a]))]);
     let w = spot.weights, best = spot.weights, least = Infinity;
     for (let step = 0; step < STEPS; step++) {
       const gap = set.parameters(this.sum(spot, middles, w)).map((x, a) => wanted[a] - x), size = Math.max(...gap.map((x, a) => Math.abs(x) / scale[a]));
       if (size < least) { least = size; best = w; }
       if (size < NEAR) return w;
-      const rate = set.rates(spot.cell, gap);
+      const rate = set.rates(this.slopes(places, bends, w), gap);
       if (!rate) break;
-      w = w.map((x, k) => x + rate[k]);
+      const short = Math.min(1, LONGEST / Math.max(...rate.map(Math.abs)));
+      w = w.map((x, k) => x + short * rate[k]);
       if (w.some((x, k) => Math.abs(x - spot.weights[k]) > FARTHEST)) break;
     }
     return best === spot.weights || least > 10 * NEAR ? spot.weights : best;

@@ -111,12 +111,12 @@ export class EquilibriumSet {
 
   /** Weights of a point of the parameters in a cell; null where the cell stands upright. */
   weights(cell: number, p: number[]): number[] | null {
-    const v = this.corners(cell), d = this.d;
-    const rows = Array.from({ length: d }, (_, a) =>
-      [...Array.from({ length: d }, (_, k) => this.place(v[k + 1], a) - this.place(v[0], a)), p[a] - this.place(v[0], a)]);
-    const rest = solve(rows, this.scale);
-    return rest && [1 - rest.reduce((x, y) => x + y, 0), ...rest];
+    const places = this.placesOf(cell), rates = this.rates(places, p.map((x, a) => x - places[0][a]));
+    if (rates) rates[0] += 1;
+    return rates;
   }
+
+  placesOf(cell: number): number[][] { return this.corners(cell).map((v) => Array.from({ length: this.d }, (_, a) => this.place(v, a))); }
 
   private get scale(): number[] { return this.words.parameters.map((each) => each.upper - each.lower); }
 
@@ -234,7 +234,7 @@ export class EquilibriumSet {
     const finish = (end: End, facet: number[] = []): Walk =>
       ({ spot: this.inCell(cell, weights), end, share, facet, visited });
     for (let step = 0; step < MANY_STEPS; step++) {
-      const rate = this.rates(cell, to.map((x, a) => x - start[a]));
+      const rate = this.rates(this.placesOf(cell), to.map((x, a) => x - start[a]));
       if (!rate) return finish("unresolved");
       let next = 1 - share, out = -1;
       for (let k = 0; k <= this.d; k++) {
@@ -262,12 +262,9 @@ export class EquilibriumSet {
     return finish("unresolved");
   }
 
-  /** Change of the weights along a direction of the parameters. */
-  rates(cell: number, direction: number[]): number[] | null {
-    const v = this.corners(cell), d = this.d;
-    const rows = Array.from({ length: d }, (_, a) =>
-      [...Array.from({ length: d }, (_, k) => this.place(v[k + 1], a) - this.place(v[0], a)), direction[a]]);
-    const rest = solve(rows, this.scale);
+  /** Change of the weights of corners in some places along a direction of the parameters; null where these stand upright. */
+  rates(corners: number[][], direction: number[]): number[] | null {
+    const [first, ...others] = corners, rest = solve(direction.map((x, a) => [...others.map((each) => each[a] - first[a]), x]), this.scale);
     return rest && [-rest.reduce((x, y) => x + y, 0), ...rest];
   }
 

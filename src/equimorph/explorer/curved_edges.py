@@ -11,11 +11,16 @@ _AT_ONCE = 8192
 
 
 def curved_edges(eset: EquilibriumSet) -> EdgeMiddles:
-    """Edges whose middle looks other than the mean of its ends, by more than `FIDELITY`."""
-    middles = edge_middles(eset)
+    """Edges whose middle is elsewhere than the mean of its ends, by more than `FIDELITY`.
+
+    That is a share of the size of the structure, or of the box of parameters.
+    """
+    middles, size = edge_middles(eset), size_of(eset.points)
     starts = range(0, len(middles.ends), _AT_ONCE)
     bends = [_bends(eset, middles, slice(first, first + _AT_ONCE)) for first in starts]
-    bent = np.concatenate([np.zeros(0), *bends]) > FIDELITY * size_of(eset.points)
+    places = middles.states.p[:, eset.setting.free] - eset.coordinates[middles.ends].mean(axis=1)
+    moved = np.abs(places / (eset.box.upper - eset.box.lower)).max(axis=1, initial=0.0)
+    bent = np.maximum(np.concatenate([np.zeros(0), *bends]) / size, moved) > FIDELITY
     return EdgeMiddles(middles.ends[bent], middles.states[bent])
 
 
