@@ -9,7 +9,7 @@ class Opened:
 
     def __init__(self, browser: Any, path: Path, fragment: str = "", **context: Any) -> None:
         self.context = browser.new_context(
-            **{"viewport": {"width": 1200, "height": 800}, "accept_downloads": True} | context
+            **{"viewport": {"width": 1000, "height": 600}, "accept_downloads": True} | context
         )
         self.page = self.context.new_page()
         self.requests: list[str] = []

@@ -10,7 +10,7 @@ import { Player } from "./player";
 import { ShapePanel, type Portrait } from "./shape";
 import { View, type Mark } from "./view";
 import { Way } from "./way";
-import { h, label, number, plain } from "./words";
+import { h, label, number, plain, withUnit } from "./words";
 
 const LETTERS = "ABCDEF";
 const NEAR = 18, CLICK = 5;
@@ -61,7 +61,7 @@ export class App {
 
   private build(): void {
     const { words } = this.set;
-    const box = words.parameters.map((p) => `${p.name} ∈ [${number(p.lower)}, ${number(p.upper)}]${p.unit && p.unit !== "1" ? ` ${p.unit}` : ""}`);
+    const box = words.parameters.map((p) => label(`${p.name} ∈ [${number(p.lower)}, ${number(p.upper)}]`, p.unit));
     const lead = [words.kind, ...box, ...words.constraints.map((each) => each.replace("<=", "≤").replace(">=", "≥"))].join(" · ");
     const scalars = words.scalars.map((each, k) => h("option", { value: k }, label(plain(each.name), each.unit)));
     this.heightChoice = h("select", { change: () => this.setHeight(Number(this.heightChoice.value)) }, ...scalars.map((each) => each.cloneNode(true)));
@@ -278,7 +278,7 @@ export class App {
     const { set, spot } = this, p = set.parameters(spot).map((x, a) => `${set.words.parameters[a].name} ${number(x)}`).join(", ");
     const words = [`${this.pins[this.current].letter}: ${indexName(set.indexOf(spot))} at ${p}.`, ENDS[this.end]];
     const unit = set.words.scalars[set.named("energy")].unit, { landing } = this;
-    if (landing?.spot) words.push(`A snap lands on the red state and releases about ${number(landing.released, 3)} ${unit === "1" ? "" : unit}.`);
+    if (landing?.spot) words.push(`A snap lands on the red state and releases about ${withUnit(number(landing.released, 3), unit)}.`);
     else if (landing) words.push(landing.status === "held" ? "Nothing moves from here." : `A snap leads out of the set (${landing.status}).`);
     return words.filter(Boolean).join(" ");
   }

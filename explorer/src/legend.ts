@@ -7,10 +7,14 @@ import { h, label, number, plain } from "./words";
 
 /** Entries for what is drawn of a set. */
 export function legend(set: EquilibriumSet, view: View): HTMLElement[] {
-  const present = [...new Set(set.cellIndex)].sort((a, b) => a - b).filter((each) => each <= INDEX_COLOURS.length);
+  const present = [...new Set(set.cellIndex)].sort((a, b) => a - b);
   const item = (swatch: HTMLElement, text: string) => h("span", { class: "entry" }, swatch, text);
   const entries: HTMLElement[] = [];
-  if (view.colour < 0) for (const index of present) entries.push(item(h("span", { class: `swatch hatch${Math.min(3, index)}${set.d === 1 && index ? " dashed" : ""}`, style: `--index: ${indexColour(index)}` }), indexName(index)));
+  const most = set.d === 1 ? 2 : INDEX_COLOURS.length - 1;
+  const named = (index: number) => (index === most && present.some((each) => each > most) ? `index ${most} and more` : indexName(index));
+  const mark = (index: number) => (set.d === 1 ? h("span", { class: `stroke branch${index}`, style: `--index: ${indexColour(index)}` })
+    : h("span", { class: `swatch hatch${index}`, style: `--index: ${indexColour(index)}` }));
+  if (view.colour < 0) for (const index of new Set(present.map((each) => Math.min(most, each)))) entries.push(item(mark(index), named(index)));
   else {
     const [low, high] = view.colourRange(), { name, unit } = set.words.scalars[view.colour];
     entries.push(h("span", { class: "entry scale" }, number(low, 3), h("span", { class: "bar", style: `background: ${scaleGradient()}` }), `${number(high, 3)} ${label(plain(name), unit)}; hatched: unstable`));

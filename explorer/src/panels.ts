@@ -2,7 +2,7 @@
 
 import { indexColour, indexName } from "./colours";
 import type { EquilibriumSet, Spot } from "./set";
-import { h, label, number, plain } from "./words";
+import { h, number, plain, withUnit } from "./words";
 
 export interface Column { name: string; colour: string; spot: Spot; exact: boolean }
 
@@ -11,13 +11,13 @@ export function numbersTable(set: EquilibriumSet, columns: Column[], remove: (co
   if (!columns.length) return h("p", { class: "hint" }, "Point at the set to see a state here; click to pin it.");
   const rows: HTMLElement[] = [];
   const row = (name: string, unit: string, values: string[]) =>
-    rows.push(h("tr", {}, h("th", { scope: "row" }, label(name, unit)), ...values.map((value) => h("td", {}, value))));
+    rows.push(h("tr", {}, h("th", { scope: "row" }, name, ...(unit && unit !== "1" ? [" ", h("span", { class: "unit" }, `(${unit})`)] : [])), ...values.map((value) => h("td", {}, value))));
   set.words.parameters.forEach(({ name, unit }, a) => row(name, unit, columns.map(({ spot }) => number(set.parameters(spot)[a]))));
   for (const { name, unit, value } of set.words.fixed) row(name, unit, columns.map(() => number(value)));
   row("index", "", columns.map(({ spot }) => { const index = set.indexOf(spot); return index === 0 ? "0, stable" : `${index}, unstable`; }));
   set.words.scalars.forEach(({ name, symbol, unit }, k) => {
     const words = plain(name);
-    row(words === symbol || name === words ? words : symbol, unit, columns.map(({ spot }) => number(set.scalar(k, spot))));
+    row(words === symbol || name === words ? words : symbol, unit, columns.map(({ spot }) => number(set.rounded(k, spot))));
   });
   row("source", "", columns.map(({ exact }) => (exact ? "computed" : "interpolated")));
   const heads = columns.map(({ name, colour }, k) =>
@@ -36,7 +36,7 @@ export function equilibriaList(set: EquilibriumSet, here: Spot, height: number, 
     const index = set.indexOf(spot);
     return h("li", {}, h("button", { type: "button", "aria-pressed": k === nearest ? "true" : "false", click: () => jump(spot) },
       h("span", { class: `swatch hatch${Math.min(3, index)}`, style: `--index: ${indexColour(index)}` }),
-      `${indexName(index)}: ${symbol} = ${number(set.scalar(height, spot), 3)}${unit && unit !== "1" ? ` ${unit}` : ""}`));
+      `${indexName(index)}: ${symbol} = ${withUnit(number(set.rounded(height, spot), 3), unit)}`));
   });
   return h("div", {}, h("p", {}, `${found.length} over these parameters, ${stable} stable, by energy:`), h("ol", { class: "equilibria" }, ...items));
 }

@@ -15,6 +15,8 @@ export interface Landing { status: string; released: number; spot: Spot | null; 
 const OUTSIDE = -1, BRANCH = -2;
 /** Barycentric slack within which a point belongs to a cell. */
 const SLACK = 1e-7;
+/** Values, as shares of the range of a scalar, that cannot be told from zero. */
+const ZERO = 3e-5;
 const MANY_STEPS = 200000;
 
 export class EquilibriumSet {
@@ -32,6 +34,7 @@ export class EquilibriumSet {
   readonly numbers: number;
   private neighbours: Int32Array | null = null;
   private facetKinds = new Map<string, "fold" | "branch point">();
+  private readonly ranges: Record<number, [number, number]> = {};
   private curves: Curves | null = null;
   private bins: { start: Int32Array; cells: Int32Array; counts: number[] } | null = null;
 
@@ -70,7 +73,23 @@ export class EquilibriumSet {
     const { low, step } = this.words.scalars[number];
     return low + step * this.arrays[`scalar${number}`][state];
   }
-  scalar(number: number, spot: Spot): number { return this.straight(number, this.shown(spot)); }
+  /** Value of a scalar, no less or more than at any vertex: curves overshoot where a scalar has a kink. */
+  scalar(number: number, spot: Spot): number {
+    const x = this.straight(number, this.shown(spot)), [low, high] = spot.cell < 0 ? [x, x] : this.range(number);
+    return Math.min(high, Math.max(low, x));
+  }
+  /** The same as it is written: zero where that cannot be told from zero. */
+  rounded(number: number, spot: Spot): number { const x = this.scalar(number, spot), [low, high] = this.range(number); return Math.abs(x) < ZERO * (high - low) ? 0 : x; }
+
+  /** Least and greatest value of a scalar at vertices. */
+  range(scalar: number): [number, number] {
+    let found = this.ranges[scalar];
+    if (found) return found;
+    found = [Infinity, -Infinity];
+    for (let v = 0; v < this.vertices; v++) { const x = this.scalarAt(scalar, v); found[0] = Math.min(found[0], x); found[1] = Math.max(found[1], x); }
+    return (this.ranges[scalar] = found);
+  }
+
   /** The same on the straight cell, as the sheet is drawn. */
   straight(number: number, spot: Spot): number { return this.mean(spot, (v) => this.scalarAt(number, v)); }
   named(name: string): number { return this.words.scalars.findIndex((each: Scalar) => each.name === name); }

@@ -10,6 +10,8 @@ type Point = number[];
 const RADIUS = 0.022;
 const HEAD = 0.028;
 const SAMPLES = 160;
+/** Pixels of letters. */
+const LETTERS = 13;
 
 export class ShapePanel {
   readonly element: HTMLElement;
@@ -27,6 +29,7 @@ export class ShapePanel {
     let at = 0;
     for (const part of set.words.layout) { this.offsets.push(at); at += this.length(part); }
     if (this.space === 3) this.makeTurnable();
+    new ResizeObserver(() => this.draw()).observe(this.element);
   }
 
   private get space(): number { return this.set.words.space; }
@@ -105,7 +108,7 @@ export class ShapePanel {
     const parts: SVGElement[] = [...this.obstacles(left, right, bottom, top)];
     const order = [...this.portraits.filter((each) => !each.main), ...this.portraits.filter((each) => each.main)];
     for (const each of order) parts.push(this.portrait(each));
-    parts.push(...this.scaleBar(left, bottom, right - left));
+    parts.push(...this.scaleBar(left, bottom, right - left, top - bottom));
     this.svg.replaceChildren(...parts);
     this.svg.setAttribute("aria-label", this.portraits.length ? `Shape of ${this.portraits.map((each) => each.name).join(", ")}` : "No state chosen");
   }
@@ -227,16 +230,17 @@ export class ShapePanel {
     });
   }
 
-  private scaleBar(left: number, bottom: number, width: number): SVGElement[] {
+  private scaleBar(left: number, bottom: number, width: number, tall: number): SVGElement[] {
+    const { clientWidth, clientHeight } = this.svg, size = LETTERS * (clientWidth ? Math.max(width / clientWidth, tall / clientHeight) : width / 400);
     const rough = 0.2 * width, power = 10 ** Math.floor(Math.log10(rough)), long = power * [5, 2, 1].find((each) => each * power <= rough)!;
-    const [x, y] = [left + 0.04 * width, bottom + 0.05 * width], text = s("text", { class: "scale-text", x: x + long / 2, y: -y - 0.015 * width, "font-size": 0.032 * width });
+    const [x, y] = [left + 0.04 * width, bottom + 0.05 * width], text = s("text", { class: "scale-text", x: x + long / 2, y: -y - 0.4 * size, "font-size": size });
     text.textContent = withUnit(number(long), this.set.words.unit);
     const parts = [s("path", { class: "scale-bar", d: this.path([[x, y], [x + long, y]]) }), text];
     if (this.space === 3) {
       const foot = [left + 0.1 * width, bottom + 0.16 * width];
       "xyz".split("").forEach((name, c) => {
         const arm = this.flat([0, 1, 2].map((k) => (k === c ? 0.06 * width : 0))), tip = [foot[0] + arm[0], foot[1] + arm[1]];
-        const word = s("text", { class: "scale-text", x: foot[0] + 1.35 * arm[0], y: -(foot[1] + 1.35 * arm[1]) + 0.01 * width, "font-size": 0.032 * width });
+        const word = s("text", { class: "scale-text", x: foot[0] + 1.35 * arm[0], y: -(foot[1] + 1.35 * arm[1]) + 0.3 * size, "font-size": size });
         word.textContent = name;
         parts.push(s("path", { class: "scale-bar", d: this.path([foot, tip]) }), word);
       });

@@ -106,6 +106,19 @@ function slice(set: EquilibriumSet, level: number, facets: Record<LineKind, Piec
     simplices: Int32Array.from(simplices), cell: Int32Array.from(cells), lines };
 }
 
+/** Pairs of ends in an order, and turned, such that each begins where the one before ends as far as possible. */
+export function inOrder(ends: ArrayLike<number>): Int32Array {
+  const out = new Int32Array(ends.length), used = new Uint8Array(ends.length / 2), at = new Map<number, number[]>();
+  for (let i = 0; i < ends.length; i++) { const own = at.get(ends[i]); if (own) own.push(i); else at.set(ends[i], [i]); }
+  let count = 0;
+  const follow = (start: number) => {
+    for (let here = start, i: number | undefined; (i = at.get(here)!.find((each) => !used[each >> 1])) !== undefined; here = ends[i ^ 1]) { used[i >> 1] = 1; out[count++] = here; out[count++] = ends[i ^ 1]; }
+  };
+  for (const [point, own] of at) if (own.length !== 2) for (const _ of own) follow(point);
+  for (const point of at.keys()) follow(point);
+  return out;
+}
+
 /** State at weights of the corners of a drawn simplex. */
 export function spotOf(set: EquilibriumSet, sheet: Sheet, simplex: number, weights: number[]): Spot {
   const cell = sheet.cell[simplex], corners = set.corners(cell), out = corners.map(() => 0);

@@ -12,7 +12,7 @@ import { Eye, SIDES, TALL } from "./eye";
 import type { EquilibriumSet, Spot } from "./set";
 import type { Overlay } from "./overlays";
 import { FRAGMENT, VERTEX } from "./shaders";
-import { LINE_KINDS, sheetOf, spotOf, type LineKind, type Sheet } from "./sheet";
+import { inOrder, LINE_KINDS, sheetOf, spotOf, type LineKind, type Sheet } from "./sheet";
 import { firstHit, normals } from "./triangles";
 import { h, label, number, ticks } from "./words";
 
@@ -36,6 +36,7 @@ export class View {
   private high = 1;
   private marks: { mark: Mark; element: HTMLElement }[] = [];
   private labels: HTMLElement[] = [];
+  private ticks: [number, number][] = [];
   private asked = false;
   private readonly dots: number;
   onFrame: () => void = () => {};
@@ -91,8 +92,7 @@ export class View {
   }
 
   private range(scalar: number): [number, number] {
-    let low = Infinity, high = -Infinity;
-    for (let v = 0; v < this.set.vertices; v++) { const x = this.set.scalarAt(scalar, v); low = Math.min(low, x); high = Math.max(high, x); }
+    let [low, high] = this.set.range(scalar);
     if (high - low < 1e-12 * Math.max(1, Math.abs(low))) { low -= 0.5; high += 0.5; }
     return [low, high];
   }
@@ -141,13 +141,10 @@ export class View {
   private addDiagram(): void {
     const { simplices, cell } = this.sheet, groups = new Map<number, number[]>();
     for (let t = 0; t < cell.length; t++) {
-      const index = Math.min(3, this.set.cellIndex[cell[t]]);
+      const index = Math.min(2, this.set.cellIndex[cell[t]]);
       groups.set(index, [...(groups.get(index) ?? []), simplices[2 * t], simplices[2 * t + 1]]);
     }
-    for (const [index, ends] of groups) {
-      const dark = index > 1 ? this.theme.faint : indexColour(index);
-      this.segments(ends, index === 0 ? 3.2 : 2, index === 0 ? indexColour(0) : dark, index ? 0.03 / index : 0);
-    }
+    for (const [index, ends] of groups) this.segments(ends, index ? 2 : 3.2, index > 1 ? this.theme.faint : indexColour(index), index && 0.03 / index);
   }
 
   private addLines(kind: LineKind): void {
@@ -161,6 +158,7 @@ export class View {
   }
 
   private segments(ends: ArrayLike<number>, width: number, colour: string, dash: number): void {
+    if (dash > 0) ends = inOrder(ends);
     const places = new Float32Array(3 * ends.length);
     for (let i = 0; i < ends.length; i++) for (let c = 0; c < 3; c++) places[3 * i + c] = this.positions[3 * ends[i] + c];
     this.add(this.polyline(places, width, colour, dash));
@@ -249,6 +247,7 @@ export class View {
   private placeLabels(): void {
     for (const each of this.labels) each.remove();
     this.labels = [];
+    this.ticks = [];
     const set = this.set, [x, z] = [SIDES[0] / 2, set.d === 1 ? 0 : SIDES[1] / 2];
     const eye = this.eye.camera.position, front = eye.z >= 0 ? z : -z, right = eye.x >= 0 ? x : -x;
     const above = set.d > 1 && eye.y > 3.5 * Math.hypot(eye.x, eye.z);
@@ -279,6 +278,11 @@ export class View {
   }
 
   private addLabel(text: string, at: [number, number], kind: string): void {
+    if (kind === "tick") {
+      // ticks of two axes meet at corners
+      if (this.ticks.some(([x, y]) => Math.abs(x - at[0]) < 6 + 4 * text.length && Math.abs(y - at[1]) < 14)) return;
+      this.ticks.push(at);
+    }
     const element = h("span", { class: `label ${kind}`, "aria-hidden": "true" }, text), half = kind === "axis" ? 4 * text.length : 10;
     // names stay inside narrow pictures
     place(element, [Math.max(half, Math.min(this.element.clientWidth - half, at[0])), at[1]]);

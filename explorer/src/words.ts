@@ -9,7 +9,7 @@ export function number(value: number, digits = 4): string {
   return text.replace("e+", "e").replaceAll("-", "−");
 }
 
-export function withUnit(text: string, unit: string): string { return unit && unit !== "1" ? `${text} ${unit}` : text; }
+export function withUnit(text: string, unit: string): string { return unit && unit !== "1" ? `${text} ${/^\d/.test(unit) ? "· " : ""}${unit}` : text; }
 export function label(name: string, unit: string): string { return unit && unit !== "1" ? `${name} (${unit})` : name; }
 
 /** The name of a scalar in words. */

@@ -26,6 +26,11 @@ REACHED = """() => { const e = document.activeElement; e.dataset.seen ??= String
 return e.dataset.seen; }"""
 CONTROLS = """() => [...document.querySelectorAll('main button, main select, main input')].filter(
 (e) => !e.disabled && e.offsetParent).length"""
+WIDE = "document.documentElement.scrollWidth"
+PLACE = """(p) => { const {set, view} = explorer, box = view.element.getBoundingClientRect();
+const [x, y] = view.eye.project(view.position(set.over(p)[0])); return [box.left + x, box.top + y];
+}"""
+"""Pixels of the window at which the state of least energy over some parameters is drawn."""
 UPPER = """() => { const e = explorer; while (e.set.scalar(e.set.named('angle'), e.spot) < 0.1
 || e.set.indexOf(e.spot)) e.next(); }"""
 """Choose the stable state with the larger angle."""
@@ -99,7 +104,7 @@ def test_a_drag_stops_at_the_fold_and_shows_the_landing(spring):
     mouse = page.page.mouse
     mouse.move(box["x"] + x, box["y"] + y)
     mouse.down()
-    for k in range(2, 25, 3):
+    for k in (2, 6, 12, 24):
         mouse.move(box["x"] + x + k * (towards[0] - x), box["y"] + y + k * (towards[1] - y))
     mouse.up()
     found = page(STATE)
@@ -154,6 +159,46 @@ def test_all_is_done_by_keys(spring):
     assert not page.page.is_visible("dialog")
 
 
+def test_pointing_at_the_set_shows_a_state_until_the_pointer_leaves(spring):
+    """Its numbers stand in a column of their own, and nothing is pinned."""
+    pins = spring("explorer.pins.length")
+    spring("explorer.view.draw()")
+    spring.page.mouse.move(*spring(PLACE, [1.2, 0.1]))
+    spring.page.wait_for_function("explorer.hover")
+    assert spring("explorer.set.parameters(explorer.hover)") == pytest.approx([1.2, 0.1], abs=0.01)
+    assert "pointer" in spring.page.inner_text(".numbers thead")
+    assert spring("explorer.pins.length") == pins
+    spring.page.mouse.move(5, 5)
+    spring.page.wait_for_function("!explorer.hover")
+
+
+@pytest.mark.parametrize(
+    ("key", "change"),
+    [
+        ("ArrowLeft", [-0.01, 0.0]), ("ArrowRight", [0.01, 0.0]), ("ArrowDown", [0.0, -0.006]),
+        ("ArrowUp", [0.0, 0.006]), ("Alt+ArrowUp", [0.0, 0.0006]), ("PageUp", [0.0, 0.0]),
+        ("PageDown", [0.0, 0.0]),
+    ],
+)  # fmt: skip
+def test_arrow_keys_walk_by_a_hundredth_of_the_box(spring, key, change):
+    """Alt walks by a thousandth; there is no third parameter."""
+    spring("explorer.goToPoint([1.2, 0.1])")
+    _focus(spring)
+    spring.page.keyboard.press(key)
+    assert spring(STATE)["p"] == pytest.approx(np.add([1.2, 0.1], change).tolist(), abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    "key", [*(f"Shift+Arrow{way}" for way in ("Left", "Right", "Up", "Down")), "+", "=", "-", "v"]
+)
+def test_keys_turn_and_move_the_set(spring, key):
+    before = spring("explorer.view.cameraText")
+    _focus(spring)
+    spring.page.keyboard.press(key)
+    assert spring("explorer.view.cameraText") != before
+    assert spring("explorer.spot === explorer.pins[explorer.current].spot")
+
+
 def test_every_control_has_a_name_and_can_be_reached(spring):
     """Buttons, fields and the set itself are named, and the tab key meets all of them."""
     nameless = spring(NAMELESS)
@@ -168,17 +213,28 @@ def test_every_control_has_a_name_and_can_be_reached(spring):
     assert spring("document.querySelector('.says').getAttribute('aria-live')") == "polite"
 
 
-def test_a_state_in_the_address_comes_back(opened, spring_page, spring):
-    """Pins, colour, place on the route and theme."""
+def test_nothing_is_wider_than_the_window(spring):
+    assert spring(WIDE) <= 1000
+
+
+def test_a_state_in_the_address_comes_back_on_a_phone(opened, spring_page, spring):
+    """Pins, colour, place on the route and theme; nothing is wider there; a tap pins a state."""
     spring("explorer.goToPoint([0.8, 0.05])")
     spring("explorer.setColour(explorer.set.named('energy'))")
     spring("explorer.player.move(0.25)")
     spring("explorer.switchAppearance()")
     fragment = spring("'#' + explorer.linkText")
-    again = opened(spring_page, fragment)
+    again = opened(spring_page, fragment, viewport={"width": 390, "height": 800}, has_touch=True)
     assert again(STATE)["p"] == pytest.approx(spring(STATE)["p"], abs=1e-6)
     assert again(STATE)["angle"] == pytest.approx(spring(STATE)["angle"], abs=1e-6)
     assert again("explorer.linkText") == fragment[1:]
+    assert again(WIDE) <= 390
+    again("explorer.lookAbove(true)")
+    again("explorer.view.draw()")
+    x, y = again(PLACE, [1.2, 0.1])
+    again.page.touchscreen.tap(x, y)
+    assert again("explorer.pins.length") == 2
+    assert again(STATE)["p"] == pytest.approx([1.2, 0.1], abs=0.02)
 
 
 AROUND = ([0.8, -0.02], [1.2, -0.05], [1.2, 0.05], [0.8, 0.02], [0.8, -0.009908])
@@ -236,27 +292,6 @@ def test_a_way_over_a_fold_is_called_blocked(spring):
         ends.append(page("explorer.way.legs[0].end"))
     assert "fold" in ends
     assert "fold" in page.page.inner_text(".way .verdict")
-
-
-@pytest.mark.parametrize("width", [390, 1200])
-def test_nothing_is_wider_than_the_window(opened, spring_page, width):
-    page = opened(spring_page, viewport={"width": width, "height": 800})
-    assert page("document.documentElement.scrollWidth") <= width
-
-
-def test_a_tap_pins_a_state(opened, spring_page):
-    """On a phone."""
-    page = opened(spring_page, viewport={"width": 390, "height": 800}, has_touch=True)
-    box = page.page.locator(".view").bounding_box()
-    page("explorer.lookAbove(true)")
-    page("explorer.view.draw()")
-    before = page("explorer.pins.length")
-    x, y = page(
-        "explorer.view.eye.project(explorer.view.position(explorer.set.over([1.2, 0.1])[0]))"
-    )
-    page.page.touchscreen.tap(box["x"] + x, box["y"] + y)
-    assert page("explorer.pins.length") == before + 1
-    assert page(STATE)["p"] == pytest.approx([1.2, 0.1], abs=0.02)
 
 
 def test_strips_and_progress_go_in_step(spring):
