@@ -180,7 +180,9 @@ class Structure(Rebuilt, Equations):
 
     def effort_unit(self, parameter: Parameter) -> str:
         """Unit of the effort of a parameter, like N m for an angle."""
-        return f"energy/({parameter.unit})"
+        if parameter.unit in ("", "1", "rad"):
+            return self.energy_unit
+        return f"{self.energy_unit}/({parameter.unit})"
 
     @abstractmethod
     def natural(self, p: Parameters) -> tuple[Lanes, Flags]:

@@ -24,9 +24,10 @@ LENGTHS = [name for name, (_, of) in UNITS.items() if of == LENGTH]
 EFFORTS = {
     **{f"{force} {length}": "M" for force in FORCES for length in LENGTHS},
     **dict.fromkeys(FORCES, "F"),
-    **{"4π²B/L": "M", "4π²B/L²": "F"},
+    **{"4π²B/L": "M", "4π²B/L²": "F", "force·length": "M", "force": "F"},
+    **dict.fromkeys((*LENGTHS, "length", "L"), "−δ"),
 }
-"""Symbols of efforts by unit: couples M and forces F."""
+"""Symbols of efforts by unit: couples M, forces F, and the travel δ of forces, which they lose."""
 
 
 @remember_call
@@ -86,7 +87,7 @@ def effort_of(structure: Structure, name: str) -> Descriptor:
         return np.asarray(unit * structure.effort(z, p)[:, at])
 
     label = structure.effort_unit(structure.parameters[at])
-    symbol = f"{EFFORTS[label]}({name})" if label in EFFORTS else f"∂L/∂{name}"
+    symbol = f"{EFFORTS.get(label, 'Q')}({name})"
     return Descriptor(f"effort({name})", label, value, symbol, structure.signature)
 
 
@@ -185,7 +186,7 @@ def find_descriptor(structure: Structure, text: str) -> Descriptor:
     --------
     >>> from equimorph import Spring
     >>> find_descriptor(Spring(), "effort(x_l)").symbol
-    '∂L/∂x_l'
+    'F(x_l)'
     """
     name = text.strip()
     if name in {each.name for each in structure.parameters}:

@@ -242,6 +242,10 @@ class Spring(Structure):
     }
     energy_unit = "force·length"
 
+    def effort_unit(self, parameter: Parameter) -> str:
+        """Unit of the effort of a parameter."""
+        return {"x_l": "force", "F": "length", "k": "length²"}[parameter.name]
+
     @cached_property
     @remember_call
     def angle(self) -> Descriptor:

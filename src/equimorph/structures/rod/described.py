@@ -18,9 +18,13 @@ from equimorph.structures.rod.extrema import extreme_curvatures, peaks, stations
 from equimorph.structures.rod.lateral import Holding, LateralStiffness, OutOfPlane
 from equimorph.structures.rod.measured import Measured
 from equimorph.structures.rod.model import RodModel
+from equimorph.structures.rod.sections import Fibre
 from equimorph.structures.rod.space import LateralMode
 from equimorph.structures.rod.space_options import SpaceOptions
+from equimorph.structures.rod.stresses import multiple, outermost_fibre, safety
+from equimorph.structures.rod.units import SI
 from equimorph.structures.states import State
+from equimorph.structures.unit_system import Quantity, UnitSystem
 
 FORCES = {"x": 0, "y": 1, "lambda": 0, "mu": 1}
 """Axes of the components of the support's force, by the axis and by the symbol of the theory."""
@@ -31,6 +35,7 @@ class Described(Measured):
 
     forms: ClassVar[tuple[str, ...]] = (
         *("height(s)", "x(s)", "angle(s)", "curvature(s)", "max_curvature", "energy"),
+        *("max_strain", "max_stress", "safety_factor(strength)"),
         *("clearance(s)", "lateral_margin", "lateral_index"),
         *("support_force(x)", "support_force(y)", "end_moment(0)", "end_moment(1)"),
     )
@@ -75,6 +80,63 @@ class Described(Measured):
         """max_s |κ(s)| in units of 1/L, ends and interior extrema included."""
         return self.max_curvature_descriptor(self._peaks)
 
+    @cached_property
+    @remember_call
+    def max_strain(self) -> Descriptor:
+        """Largest strain of bending, max_s |κ(s)| t/2, of a rod with a `section` of thickness t.
+
+        Raises
+        ------
+        MissingError
+            Without the size of the section, or for a rod that is curved when free of stress.
+        """
+        return multiple(self.max_curvature, self._fibre.distance, "max_strain", "1", "max |ε|")
+
+    @cached_property
+    @remember_call
+    def max_stress(self) -> Descriptor:
+        """Largest stress of bending, E times `max_strain`: ``rod.max_stress <= "400 MPa"``.
+
+        Raises
+        ------
+        MissingError
+            As of `max_strain`.
+        """
+        label = self._system.label("force/length²")
+        return multiple(self.max_strain, self._fibre.E, "max_stress", label, "max |σ|")
+
+    @check_arguments
+    @remember_call
+    def safety_factor(self, strength: Quantity) -> Descriptor:
+        """A strength over the largest stress of bending: ``rod.safety_factor("900 MPa") >= 1.5``.
+
+        Parameters
+        ----------
+        strength
+            Stress that the material bears, a number in the rod's units or a text.
+
+        Raises
+        ------
+        InputError
+            If it is not positive or no stress, or as of `max_strain`.
+        """
+        number = float(self._system.number(strength, "force/length²", "strength"))
+        return safety(self.max_stress, number, str(strength))
+
+    @property
+    @abstractmethod
+    def is_straight_when_free(self) -> bool:
+        """Whether the rod is uniform, and straight where it is free of stress."""
+
+    @property
+    def _system(self) -> UnitSystem:
+        return SI if self.units.system.plain else self.units.system
+
+    @property
+    def _fibre(self) -> Fibre:
+        bent = not self.is_straight_when_free
+        return outermost_fibre(self.space_options.section, self._system, bent)
+
     def _peaks(self, z: Lanes, p: Parameters) -> tuple[Peaks, Peaks]:
         """Local maxima of |κ|, and the arclengths where they are."""
         at = stations(self.mesh.breaks)
@@ -114,6 +176,8 @@ class Described(Measured):
         if name in ("lateral_index", "lateral_margin"):
             make = self.lateral_index if name == "lateral_index" else self.lateral_margin
             return make(*space.stiffness_arguments(argument))
+        if name in ("max_strain", "max_stress", "safety_factor"):
+            return self._stress_descriptor(name, argument)
         if argument in ("0", "1") and name == "end_moment":
             return self.end_moment(int(argument))
         if argument is None or name not in ("x", "height", "angle", "curvature"):
@@ -122,6 +186,12 @@ class Described(Measured):
         if name in ("x", "height"):
             return self.coordinate(COORDINATES.index(name), s)
         return self.angle(s) if name == "angle" else self.curvature(s)
+
+    def _stress_descriptor(self, name: str, argument: str | None) -> Descriptor | None:
+        if name == "safety_factor":
+            return None if argument is None else self.safety_factor(argument)
+        plain = {"max_strain": lambda: self.max_strain, "max_stress": lambda: self.max_stress}
+        return plain[name]() if argument is None else None
 
     # --- out of the plane -------------------------------------------------------------------
 

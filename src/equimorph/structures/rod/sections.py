@@ -53,6 +53,14 @@ class SectionProperties:
         return self.EI_out / self.EI
 
 
+@dataclass(frozen=True)
+class Fibre:
+    """The outermost fibre in the plane: distance from the axis, and Young's modulus."""
+
+    distance: float
+    E: float
+
+
 class CrossSection(ABC):
     """A cross-section of a rod; its numbers are in the units of the rod, texts have their own."""
 
@@ -85,6 +93,11 @@ class CrossSection(ABC):
         names = [each.name for each in fields(self)]  # type: ignore[arg-type]  # as below
         return {name: getattr(self, name) for name in names if name not in ("nu", "density")}
 
+    def fibre(self, system: UnitSystem) -> Fibre | None:
+        """Outermost fibre in the plane, in a system of units; None where the size is not known."""
+        del system
+        return None
+
     @abstractmethod
     def _in(self, system: UnitSystem) -> SectionProperties:
         """Stiffnesses and weight in a system of units."""
@@ -108,9 +121,16 @@ PoissonRatio = Annotated[
 class _Shape(CrossSection):
     """A section of one isotropic material."""
 
+    across: ClassVar[str]
+    """Its size in the plane of the rod."""
     E: Quantity
     nu: PoissonRatio
     density: Quantity | None
+
+    def fibre(self, system: UnitSystem) -> Fibre:
+        """Half the thickness or diameter from the axis."""
+        size = self._number(self.across, "length", system)
+        return Fibre(0.5 * size, self._number("E", "force/length²", system))
 
     def _stiffnesses(
         self, area: float, second: tuple[float, float], torsion: float, system: UnitSystem
@@ -173,6 +193,7 @@ class Strip(_Shape):
     nu: PoissonRatio
     density: Quantity | None = None
     word: ClassVar[str] = "strip"
+    across: ClassVar[str] = "thickness"
 
     def _in(self, system: UnitSystem) -> SectionProperties:
         w, t = (self._number(name, "length", system) for name in ("width", "thickness"))
@@ -228,6 +249,7 @@ class Tube(_Shape):
     nu: PoissonRatio
     density: Quantity | None = None
     word: ClassVar[str] = "tube"
+    across: ClassVar[str] = "diameter"
 
     def _in(self, system: UnitSystem) -> SectionProperties:
         d, wall = (self._number(name, "length", system) for name in ("diameter", "wall"))
@@ -257,6 +279,7 @@ class Round(_Shape):
     nu: PoissonRatio
     density: Quantity | None = None
     word: ClassVar[str] = "round"
+    across: ClassVar[str] = "diameter"
 
     def _in(self, system: UnitSystem) -> SectionProperties:
         return self._annulus(self._number("diameter", "length", system), 0.0, system)
