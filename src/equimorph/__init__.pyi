@@ -115,6 +115,11 @@ from .equilibria import (
     EnergyPath as EnergyPath,
     Merge as Merge,
 )
+from .manifold import (
+    barriers as barriers,
+    SetBarriers as SetBarriers,
+    Barriers as Barriers,
+)
 
 # Follow critical states
 from .equilibria import (

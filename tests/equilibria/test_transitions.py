@@ -55,6 +55,39 @@ def test_the_barrier_of_a_spring_is_that_of_its_flat_state(x_l):
     assert barrier.landing.z[0] == pytest.approx(-network.states[0].z[0], abs=1e-9)
 
 
+@pytest.mark.parametrize("rise", [0.1, 0.3])
+def test_the_barrier_of_a_row_of_trusses_is_that_of_its_flattest_unit(rise):
+    """Bars of length l₀ that slide over their span 1: EA l₀/2 (1/l₀ − 1)², two of them, guided."""
+    truss = em.Truss(
+        {"A": (0.0, 0.0), "B": (1.0, rise), "C": (0.0, 2.0 * rise)},
+        [em.Bar(ends, EA=3.0) for ends in (("A", "B"), ("B", "C"))],
+        {"A": "xy", "B": "x", "C": "x"},
+        {"F": {"C": (0.0, -1.0)}},
+    )
+    network = em.transition_network(truss, {"F": 0.0})
+    length = np.hypot(1.0, rise)
+    known = 3.0 * length / 2.0 * (1.0 / length - 1.0) ** 2
+    heights = [network.barrier(state).energy for state in network.states[network.minima]]
+    assert heights == pytest.approx([known] * 4, abs=1e-9)
+
+
+def test_the_barrier_of_a_von_mises_truss_is_known():
+    """Two bars with Green strain: E = 2 ½ EA L ε², ε = (y² − a²)/(2 L²); flat at y = 0."""
+    rise = 0.3
+    truss = em.Truss(
+        {"A": (-1.0, 0.0), "B": (0.0, rise), "C": (1.0, 0.0)},
+        [em.Bar(("A", "B")), em.Bar(("B", "C"))],
+        {"A": "xy", "B": "x", "C": "xy"},
+        {"F": {"B": (0.0, -1.0)}},
+        strain="green",
+    )
+    network = em.transition_network(truss, {"F": 0.0})
+    length = np.hypot(1.0, rise)
+    known = length * (rise**2 / (2.0 * length**2)) ** 2
+    heights = [network.barrier(state).energy for state in network.states[network.minima]]
+    assert heights == pytest.approx([known] * 2, abs=1e-9)
+
+
 def test_nothing_to_snap_to_is_an_answer():
     """A spring longer than its guide has one state; an unbounded well lets the structure escape."""
     network = em.transition_network(em.Spring(), {"x_l": 1.1, "F": 0.0})

@@ -13,7 +13,16 @@ from equimorph.arrays import Values
 from equimorph.equilibria.soft_modes import metric_length
 from equimorph.structures import State, States
 
-Status = Literal["landed", "escaped", "unresolved", "lost", "nothing to snap to"]
+Status = Literal[
+    "landed",
+    "escaped",
+    "unresolved",
+    "lost",
+    "beyond the set",
+    "nothing to snap to",
+    "unstable",
+    "unknown",
+]
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,9 +34,12 @@ class EnergyBarrier:
     status
         "landed": at another stable state; "escaped": no state stops it; "unresolved": where the
         discretisation does not represent states; "lost": the descent failed numerically;
-        "nothing to snap to": no saddle leads elsewhere.
+        "beyond the set": at a state that a set lacks, as one beyond its constraints; "nothing to
+        snap to": no saddle leads elsewhere; "unstable": the state is no minimum; "unknown": it is
+        no state of the set, or the set lacks the saddles between its minima.
     energy
-        Of the saddle above the state, in the structure's unit of energy; infinite without one.
+        Of the saddle above the state, in the structure's unit of energy; infinite without one,
+        zero for an unstable state, not a number for an unknown one.
     saddle, landing
         The saddle, and the stable state beyond it.
     released

@@ -5,50 +5,25 @@ See docs/barriers.md.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from enum import IntEnum
 from functools import cached_property
-from itertools import pairwise, product
+from itertools import pairwise
 
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
 from equimorph.array_types import Int
 from equimorph.arrays import Flags, Values
-from equimorph.equilibria.energy_barriers import EnergyBarrier, EnergyPath, Merge, Status
-from equimorph.equilibria.gradient_flow import FAITHFUL, Ending
+from equimorph.equilibria.energy_barriers import EnergyBarrier, EnergyPath, Merge
+from equimorph.equilibria.gradient_flow import FAITHFUL
 from equimorph.equilibria.minima_graph import NONE, Argument, MinimaGraph, arguments_of
 from equimorph.equilibria.search import Completeness, search_with_graph
 from equimorph.equilibria.snap import snap_landing
 from equimorph.equilibria.soft_modes import metric_length
+from equimorph.equilibria.ways import Nowhere, ways_over
 from equimorph.errors import InputError
 from equimorph.model import Constraint, parameter_vector
 from equimorph.structures import State, States, Structure, join_states
 from equimorph.tolerances import SAME_PLACE, SAME_SOLUTION
-
-
-class Nowhere(IntEnum):
-    """Instead of the number of a state: how a descent ended that met none."""
-
-    UNRESOLVED = -1
-    """Where the discretisation does not represent states."""
-    ESCAPED = -2
-    """It left for infinity: no state stops it."""
-    LOST = -3
-    """A numerical failure."""
-
-
-ENDS = {
-    Ending.LANDED: Nowhere.UNRESOLVED,
-    Ending.SADDLE: Nowhere.UNRESOLVED,
-    Ending.ESCAPED: Nowhere.ESCAPED,
-}
-"""Where descents end that met no resolved state; the others are lost."""
-
-WORDS: dict[Nowhere, Status] = {
-    Nowhere.UNRESOLVED: "unresolved",
-    Nowhere.ESCAPED: "escaped",
-    Nowhere.LOST: "lost",
-}
 
 
 def _way_in_tree(links: list[tuple[int, int]], start: int, goal: int) -> list[int] | None:
@@ -112,30 +87,8 @@ class TransitionNetwork:
         at a saddle leads to all minima below that one. Saddles that lead to the same minimum on
         both sides have no way over them.
         """
-        rows: list[tuple[int, int, int]] = []
-        for saddle, ends in self._rows:
-            one, other = (self._below[saddle][end] for end in ends)
-            pairs = set(product(one, other)) | set(product(other, one))
-            over = [(start, end) for start, end in pairs if start != end and start >= 0]
-            # states first, the lowest of them at the front
-            rows += [(saddle, *pair) for pair in sorted(over, key=lambda pair: (pair[1] < 0, pair))]
-        return tuple(rows)
-
-    @property
-    def _rows(self) -> list[tuple[int, list[int]]]:
-        """Saddles and the ends of their descents, by energy."""
-        return sorted(zip(self.saddles.tolist(), self.ends.tolist(), strict=True))
-
-    @cached_property
-    def _below(self) -> dict[int, dict[int, frozenset[int]]]:
-        """Minima to which each end of the descents from each saddle leads."""
-        known: dict[int, dict[int, frozenset[int]]] = {}
-        # descents end lower than they begin, and states are sorted by energy
-        for saddle, ends in self._rows:
-            known[saddle] = {
-                end: frozenset[int]().union(*known.get(end, {end: {end}}).values()) for end in ends
-            }
-        return known
+        rows = ways_over(self.saddles, self.ends, self.energy)
+        return tuple((saddle, start, end) for saddle, start, end in rows.tolist())
 
     @cached_property
     def merges(self) -> tuple[Merge, ...]:
@@ -221,33 +174,36 @@ class TransitionNetwork:
         ways = [steps[pair] for pair in pairwise(minima)]
         parts: list[State | States] = [self.states[here]]
         for saddle, one, other in ways:
-            up, down = self._descent(saddle, one), self._descent(saddle, other)
+            both = (self._descent(saddle, one), self._descent(saddle, other))
+            up, down = (each for each in both if each is not None)
             parts += [up[::-1], self.states[saddle], down, self.states[other]]
         saddles = np.array([saddle for saddle, _, _ in ways], int)
         whole = join_states(self.states.structure, parts)
         return EnergyPath(whole, self.states[minima], self.states[saddles])
 
-    def _descent(self, saddle: int, goal: int) -> States:
-        """Configurations on the way down from a saddle to a minimum, over saddles on the way."""
+    def _descent(self, saddle: int, goal: int) -> States | None:
+        """Configurations on the way down from a saddle to a minimum, over saddles on the way.
+
+        None if the minimum does not lie below the saddle.
+        """
         row = int(np.flatnonzero(self.saddles == saddle)[0])
-        for end, landing in zip(
-            self.ends[row].tolist(), snap_landing(self.states[saddle]), strict=True
-        ):
-            if goal not in self._below[saddle][end]:
-                continue
-            way = landing.way[1:]
+        landings = snap_landing(self.states[saddle])
+        for end, landing in zip(self.ends[row].tolist(), landings, strict=True):
             if end == goal:
-                return way
-            onward = self.states[end], self._descent(end, goal)
-            return join_states(way.structure, (way, *onward))
-        raise AssertionError("a way leads down to its minima")
+                return landing.way[1:]
+            if end in self.saddles:
+                onward = self._descent(end, goal)
+                if onward is not None:
+                    parts = landing.way[1:], self.states[end], onward
+                    return join_states(onward.structure, parts)
+        return None
 
     def _barrier(self, saddle: int, start: int, end: int) -> EnergyBarrier:
         """Barrier of a way."""
         height = float(self.energy[saddle] - self.energy[start])
         top, good = self.states[saddle], bool(self.admissible[saddle])
         if end < 0:
-            return EnergyBarrier(WORDS[Nowhere(end)], height, top, admissible=good)
+            return EnergyBarrier(Nowhere(end).status, height, top, admissible=good)
         released = float(self.energy[saddle] - self.energy[end])
         good = good and bool(self.admissible[end])
         return EnergyBarrier("landed", height, top, self.states[end], released, good)
@@ -299,7 +255,7 @@ def transition_network(
     order = np.argsort(structure.energy(graph.z, p), kind="stable")
     place, ends = np.argsort(order), dict[int, list[int]]()
     for edge in graph.edges:
-        nowhere = ENDS.get(edge.ending, Nowhere.LOST)
+        nowhere = Nowhere.of(edge.ending)
         end = nowhere if edge.end == NONE else int(place[edge.end])
         ends.setdefault(int(place[edge.saddle]), []).append(end)
     saddles = np.array(sorted(ends), int)

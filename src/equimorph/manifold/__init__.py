@@ -12,6 +12,7 @@ from equimorph.manifold.complex.equilibrium_set import (
 from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.lookup.exact_states import lift_to
 from equimorph.manifold.lookup.states_over import StatesOver
+from equimorph.manifold.queries.barriers import Barriers, SetBarriers, barriers
 from equimorph.manifold.queries.components import Components, components
 from equimorph.manifold.queries.cusps import Cusps, cusps
 from equimorph.manifold.queries.edge_middles import EdgeMiddles, edge_middles
@@ -34,6 +35,7 @@ from equimorph.manifold.refining.refine import refine
 __all__ = [
     "INTERVALS",
     "Audit",
+    "Barriers",
     "Boundary",
     "BoundaryKind",
     "Component",
@@ -45,12 +47,14 @@ __all__ = [
     "Level",
     "Location",
     "Place",
+    "SetBarriers",
     "Snap",
     "SnapGraph",
     "StabilityDistance",
     "StatesOver",
     "Stratum",
     "VertexKind",
+    "barriers",
     "cell_sizes",
     "components",
     "cusps",
