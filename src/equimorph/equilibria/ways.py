@@ -6,8 +6,8 @@ See docs/barriers.md.
 from enum import IntEnum
 
 import numpy as np
-from jaxtyping import Int
 
+from equimorph.array_types import Int
 from equimorph.arrays import Values
 from equimorph.equilibria.energy_barriers import Status
 from equimorph.equilibria.gradient_flow import Ending

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
-from jaxtyping import Float, Int
 
+from equimorph.array_types import Float, Int
 from equimorph.arrays import Flags, Lanes, Some
 from equimorph.equilibria.descents import descend
 from equimorph.equilibria.gradient_flow import FAITHFUL, Ending

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Int
 
 from equimorph.argument_checks import check_arguments
+from equimorph.array_types import Int
 from equimorph.arrays import Flags, ItemValues, Lanes, Numbers, Parameters, Some, Values
 from equimorph.equilibria import EnergyBarrier
 from equimorph.equilibria.snap import CRITICAL
