@@ -37,6 +37,7 @@ def test_whatever_is_constructed_comes_back(kind, given):
     assert type(copy.deepcopy(thing)) is kind
     if isinstance(thing, em.Structure):
         assert again.signature == thing.signature
+        assert all(back(each) == each for each in described(thing))
     else:
         assert repr(again) == repr(thing)
 

@@ -7,6 +7,7 @@ page for each group.
 from . import (
     charts as charts,
     cli as cli,
+    cluster as cluster,
     control as control,
     dynamics as dynamics,
     equilibria as equilibria,
@@ -337,12 +338,16 @@ from .control import (
 from .linalg import (
     set_threads as set_threads,
 )
+from .model import (
+    Workers as Workers,
+)
 
 # Errors
 from .errors import (
     EquimorphError as EquimorphError,
     InputError as InputError,
     CancelledError as CancelledError,
+    LostWorkersError as LostWorkersError,
 )
 
 __version__: str

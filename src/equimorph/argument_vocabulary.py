@@ -104,6 +104,10 @@ CLASSES: Mapping[str, tuple[str, str]] = {
         "a descriptor, like `rod.max_curvature`",
         "descriptors, like `[rod.max_curvature]`",
     ),
+    "Workers": (
+        "workers with the method `map(function, chunks)`, like `cluster.dask(client)`",
+        "workers",
+    ),
     "Progress": ("a sink with the method `report(stage, done, total)`", "sinks"),
     "Journal": ("a journal, like `storage.open_journal(path)`", "journals"),
     "Schedule": ("a schedule, like `route.schedule` of a route that arrived", "schedules"),

@@ -23,6 +23,10 @@ class CancelledError(EquimorphError):
     """Raised by a progress sink to cancel a computation; lifts of many states keep what is done."""
 
 
+class LostWorkersError(EquimorphError):
+    """A cluster lost the workers that computed a chunk, more often than its scheduler allows."""
+
+
 def suggestion(written: str, allowed: Sequence[str]) -> str:
     """Sentence to end a message with when an allowed name is close to what was written, or nothing.
 

@@ -7,7 +7,8 @@ import json
 import logging
 import sys
 import warnings
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Generator, Iterable
+from contextlib import contextmanager
 from enum import StrEnum
 from functools import partial
 from pathlib import Path
@@ -15,7 +16,7 @@ from typing import Annotated, Any
 
 import typer
 
-from equimorph.errors import InputError
+from equimorph.errors import InputError, LostWorkersError
 
 PROGRAM = "equimorph"
 BAD_INPUT = 2
@@ -190,6 +191,13 @@ def run(
     allow_refused: Annotated[
         bool, typer.Option("--allow-refused", help="Exit code 0 where questions are refused.")
     ] = False,
+    cluster: Annotated[
+        str,
+        typer.Option(
+            help="Compute the rays of maps and the trials on a cluster of Dask: local:n for n "
+            "processes here, or the address of a scheduler, like tcp://host:8786."
+        ),
+    ] = "",
 ) -> None:
     """Run studies: equilibrium set, equilibria, routes, figures, schedules, report.
 
@@ -200,9 +208,10 @@ def run(
         raise typer.BadParameter("give one of --quiet and --verbose.")
     options = {"replace": replace, "as_json": as_json, "quiet": quiet, "verbose": verbose}
     codes = []
-    for file, folder in _folders(files, out):
-        command = partial(_run_one, file, folder, **options)
-        codes.append(_exit_code(command, file, as_json=as_json))
+    with _workers_of(cluster) as workers:
+        for file, folder in _folders(files, out):
+            command = partial(_run_one, file, folder, workers, **options)
+            codes.append(_exit_code(command, file, as_json=as_json))
     raise typer.Exit(_worst(0 if allow_refused and code == REFUSED else code for code in codes))
 
 
@@ -240,13 +249,27 @@ def _folders(files: list[Path], out: Path | None) -> list[tuple[Path, Path]]:
     return [(file, (out or Path("results")) / file.stem) for file in files]
 
 
-def _run_one(file: Path, out: Path, *, replace: bool, **shown: bool) -> int:
+@contextmanager
+def _workers_of(cluster: str) -> Generator[Any]:
+    """Give the workers of a cluster while a block lasts; None without one."""
+    if not cluster:
+        yield None
+        return
+    from equimorph.cluster import connect
+
+    with connect(cluster) as workers:
+        yield workers
+
+
+def _run_one(file: Path, out: Path, workers: Any, *, replace: bool, **shown: bool) -> int:
     """Run one study; return its exit code."""
     try:
         from equimorph.cli.output import Output
         from equimorph.cli.run import run_and_show
 
-        return REFUSED if run_and_show(file, out, Output(**shown), replace=replace) else 0
+        output = Output(**shown)
+        refused = run_and_show(file, out, output, replace=replace, workers=workers)
+        return REFUSED if refused else 0
     except KeyboardInterrupt as stop:
         kept = str(stop) or f"what is finished is kept in {out}"
         typer.echo(f"equimorph: interrupted; {kept}. Run again to go on.", err=True)
@@ -259,7 +282,7 @@ def _exit_code(
     """Run a command on one study; a wrong one gets a line, or all its lines, and exit code 2."""
     try:
         return command()
-    except InputError as error:
+    except (InputError, LostWorkersError) as error:
         mistakes = tuple(getattr(error, "lines", ())) or (str(error),)
         lines = mistakes if all_mistakes else (str(error),)
     except MemoryError:

@@ -18,7 +18,7 @@ from equimorph.equilibria import find_equilibria, limit_load
 from equimorph.equilibria.step_kernels import proceed
 from equimorph.linalg.compiled import is_kept
 from equimorph.manifold import EquilibriumSet, equilibrium_set
-from equimorph.model import Box, Constraint, Descriptor
+from equimorph.model import Box, Constraint, Descriptor, Workers
 from equimorph.structures import Spring, States
 from equimorph.study import Outcome, Problem, read_problem, run_study, summary
 
@@ -27,7 +27,9 @@ COMPILED = "kernels that are compiled are kept; the study had not begun"
 _MARCH = f"from {__name__} import march; march()"
 
 
-def run_and_show(file: Path, out: Path, output: Output, *, replace: bool) -> bool:
+def run_and_show(
+    file: Path, out: Path, output: Output, *, replace: bool, workers: Workers | None = None
+) -> bool:
     """Run a study with progress on stderr, then show its answers.
 
     Parameters
@@ -40,6 +42,8 @@ def run_and_show(file: Path, out: Path, output: Output, *, replace: bool) -> boo
         What to write, and where.
     replace
         Replace the results of another study there.
+    workers
+        Who computes the rays of maps and the trials.
 
     Returns
     -------
@@ -53,7 +57,7 @@ def run_and_show(file: Path, out: Path, output: Output, *, replace: bool) -> boo
         except KeyboardInterrupt:
             raise KeyboardInterrupt(COMPILED) from None
     with output.progress() as progress:
-        outcome = run_study(file, out, replace=replace, progress=progress)
+        outcome = run_study(file, out, replace=replace, progress=progress, workers=workers)
     _show(outcome, output)
     report = out / "index.html"
     output.show(f"Report: {escape(str(report))}")

@@ -1,6 +1,6 @@
 """Natural states over a grid of settings: one from the structure, the rest by continuation."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import ndimage
@@ -41,6 +41,10 @@ class NaturalSheet:
     places: Int[np.ndarray, " 2"]
     z: Float[np.ndarray, "vertices size"]
     found: Bool[np.ndarray, " vertices"]
+
+    def without_states(self) -> "NaturalSheet":
+        """Return the sheet without its states, for those who are given what they need of it."""
+        return replace(self, z=self.z[:0], found=self.found[:0])
 
     def parameters(self, settings: Settings) -> Parameters:
         """All parameters at settings, unloaded."""

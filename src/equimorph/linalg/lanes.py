@@ -2,8 +2,9 @@
 
 import os
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import contextmanager
 from functools import cached_property, lru_cache
 from itertools import pairwise
 from typing import Any, TypeVar
@@ -84,6 +85,18 @@ _worker = threading.local()
 def _mark() -> None:
     """Mark a thread of the pool: what it computes is not shared out once more."""
     _worker.own = True
+
+
+@contextmanager
+def one_thread() -> Generator[None]:
+    """Share nothing out among threads while a block lasts: what the calling thread computes."""
+    before = hasattr(_worker, "own")
+    _mark()
+    try:
+        yield
+    finally:
+        if not before:
+            del _worker.own
 
 
 def in_background(tasks: Sequence[Callable[[], None]]) -> list[Future[None]]:

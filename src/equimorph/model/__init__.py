@@ -43,6 +43,7 @@ from equimorph.model.parameter import (
 from equimorph.model.rebuilding import Call, Rebuilt, remember_call
 from equimorph.model.schedule import Rates, Schedule
 from equimorph.model.spline import Spline
+from equimorph.model.workers import Workers, cut_rows, map_rows
 
 __all__ = [
     "NOT_KEPT",
@@ -72,12 +73,15 @@ __all__ = [
     "Support",
     "SupportKind",
     "Vanishing",
+    "Workers",
     "are_feasible",
     "combined",
     "content_of_descriptor",
     "content_of_function",
+    "cut_rows",
     "eased",
     "largest_of",
+    "map_rows",
     "names_of",
     "parameter_vector",
     "position",

@@ -22,7 +22,7 @@ from rich.markup import escape as plain
 
 from equimorph import plotting
 from equimorph.manifold import EquilibriumSet
-from equimorph.model import Constraint, Descriptor, Progress, Schedule
+from equimorph.model import Constraint, Descriptor, Progress, Schedule, Workers
 from equimorph.storage import write_schedule
 from equimorph.storage.files import write_csv
 from equimorph.structures import Structure
@@ -147,9 +147,12 @@ class Question:
         """Free parameters of the set."""
         return self.ground.box.names
 
-    def answer(self, eset: EquilibriumSet | None, sink: Progress) -> Any:
+    def answer(
+        self, eset: EquilibriumSet | None, sink: Progress, workers: Workers | None = None
+    ) -> Any:
         """Compute the answer; `InputError` names the key."""
         arguments = self._arguments(eset, sink)
+        arguments["workers"] = workers
         with at_key(self.key):
             return self.kind.answer(self, arguments)
 

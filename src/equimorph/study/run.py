@@ -1,7 +1,8 @@
 """Run a study: compute, store, draw, report."""
 
-from collections.abc import Generator, Mapping, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import contextmanager
+from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 from time import perf_counter
@@ -13,7 +14,7 @@ from equimorph.argument_checks import check_arguments
 from equimorph.errors import InputError
 from equimorph.logs import log_of
 from equimorph.manifold import EquilibriumSet, equilibrium_set
-from equimorph.model import Progress, Silent
+from equimorph.model import Progress, Silent, Workers
 from equimorph.storage import write_results
 from equimorph.storage.files import link_file, read_text
 from equimorph.structures import States
@@ -34,7 +35,12 @@ LOG = log_of(__name__)
 
 @check_arguments
 def run_study(
-    path: Path, out: Path, *, replace: bool = False, progress: Progress | None = None
+    path: Path,
+    out: Path,
+    *,
+    replace: bool = False,
+    progress: Progress | None = None,
+    workers: Workers | None = None,
 ) -> Outcome:
     """Run a study file into a results folder.
 
@@ -51,6 +57,8 @@ def run_study(
         Replace the results of another study, or of an earlier version of this one.
     progress
         Receives the progress of the run.
+    workers
+        Who computes the rays of maps and the trials; see `Workers`.
 
     Returns
     -------
@@ -65,7 +73,7 @@ def run_study(
     sink = MemoryWatch(progress or Silent())
     text, study, problem = read_problem(path)
     with open_results_folder(out, study, replace=replace) as folder:
-        outcome = solve(study, problem, folder, sink)
+        outcome = solve(study, problem, folder, sink, workers)
         same_words = folder.holds([INPUT_COPY]) and read_text(out / INPUT_COPY) == text
         _store(outcome, folder, text)
         with _measure_time(outcome.seconds, "figures"):
@@ -123,7 +131,13 @@ def _further_mistakes(text: str, path: Path, error: StudyError) -> Sequence[str]
     return ()
 
 
-def solve(study: Study, problem: Problem, folder: ResultsFolder, progress: Progress) -> Outcome:
+def solve(
+    study: Study,
+    problem: Problem,
+    folder: ResultsFolder,
+    progress: Progress,
+    workers: Workers | None = None,
+) -> Outcome:
     """Answer everything that a study asks for.
 
     Parameters
@@ -134,6 +148,8 @@ def solve(study: Study, problem: Problem, folder: ResultsFolder, progress: Progr
         Where answers are kept, and where earlier ones may be.
     progress
         Receives the progress of the run.
+    workers
+        Who computes the rays of maps and the trials.
     """
     seconds: dict[str, float] = {}
     checkpoints = Checkpoints(folder, problem.structure)
@@ -152,7 +168,8 @@ def solve(study: Study, problem: Problem, folder: ResultsFolder, progress: Progr
     for done, question in enumerate(problem.questions):
         progress.report("questions", done, count)
         with _measure_time(seconds, f"{question.kind.table} {question.name}"):
-            answers.append(_answer(study, question, eset, checkpoints, progress))
+            compute = partial(question.answer, eset, progress, workers)
+            answers.append(_answer(study, question, checkpoints, compute))
     progress.report("questions", count, count)
     checkpoints.forget_others()
     return Outcome(study, problem, eset, points, tuple(answers), reused, seconds)
@@ -193,15 +210,13 @@ def _equilibria(
 def _answer(
     study: Study,
     question: Question,
-    eset: EquilibriumSet | None,
     checkpoints: Checkpoints,
-    progress: Progress,
+    compute: Callable[[], Any],
 ) -> Answered:
     kind, section = question.kind, question.section
     words = section.model_dump(mode="json", exclude={"name"})
     asked = {**_question(study, of_set=kind.needs_set(section)), kind.table: words}
-    answer = checkpoints.answer(asked, lambda: question.answer(eset, progress))
-    return Answered(question, answer)
+    return Answered(question, checkpoints.answer(asked, compute))
 
 
 def _store(outcome: Outcome, folder: ResultsFolder, text: str) -> None:

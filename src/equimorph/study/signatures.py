@@ -26,6 +26,7 @@ from equimorph.model import (
     Progress,
     Rates,
     Schedule,
+    Workers,
 )
 from equimorph.structures import State, States, Structure
 from equimorph.study import arguments as given
@@ -75,7 +76,7 @@ MEANINGS: Mapping[str, Any] = {
     "tolerances": dict[str, Positive],
 }
 """What values may be, of parameters whose names mean the same in all tasks."""
-SUPPLIED = (EquilibriumSet, Structure, Progress, Journal)
+SUPPLIED = (EquilibriumSet, Structure, Progress, Journal, Workers)
 """Types of what a study has anyway."""
 MONITOR = "monitor"
 """Descriptors that a schedule records: the study gives the one that distinguishes states."""

@@ -2,7 +2,7 @@
 
 from abc import abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -12,7 +12,17 @@ from equimorph.array_types import Bool, Float, Int
 from equimorph.equilibria.natural_sheet import NaturalSheet, natural_sheet
 from equimorph.errors import InputError
 from equimorph.html_tables import html_table
-from equimorph.model import Constraint, Grid, Progress, Silent, parameter_vector, position
+from equimorph.model import (
+    Constraint,
+    Grid,
+    Progress,
+    Silent,
+    Workers,
+    cut_rows,
+    map_rows,
+    parameter_vector,
+    position,
+)
 from equimorph.structures import State, States, Structure
 from equimorph.tables import Table, Tabular, units_of
 from equimorph.tasks.maps.causes import Paths
@@ -161,11 +171,13 @@ def survey(
     grid: Grid,
     stage: str,
     progress: Progress | None,
+    workers: Workers | None,
     near_curves: Paths | None = None,
 ) -> Survey:
     """Compute a map over a grid, and the curves on which it is not smooth.
 
-    Paths are followed from the natural states at all vertices. On edges over which the map jumps or
+    Paths are followed from the natural states at all vertices, by workers if there are any: all the
+    rest is computed here, once. On edges over which the map jumps or
     bends the exact places are found, and places of one kind are connected across the cells.
 
     Parameters
@@ -178,18 +190,25 @@ def survey(
         Name of the computation for progress reports.
     progress
         Receives reports on the progress.
+    workers
+        Who follows the paths from the vertices.
     near_curves
         Paths with other step control for the places on edges; by default the same.
     """
     sink = progress or Silent()
     settings, shape = settings_of(grid)
-    sink.report(stage, 0, 2)
-    vertices = paths(settings)
-    sink.report(stage, 1, 2)
+    cuts = cut_rows(len(settings), workers)
+    steps = len(cuts) + 1
+    sink.report(stage, 0, steps)
+    follow = replace(paths, sheet=paths.sheet.without_states()).follow
+    vertices = map_rows(
+        follow, paths.natural_samples(settings), cuts, workers,
+        lambda done: sink.report(stage, done, steps),
+    )  # fmt: skip
     explained, unexplained = places_on(near_curves or paths, vertices, shape)
     edge = edge_of_definition(paths, settings, shape)
     curves = curves_through(paths.sheet, (explained, unexplained, edge), shape)
-    sink.report(stage, 2, 2)
+    sink.report(stage, steps, steps)
     states = States(paths.sheet.structure, vertices.z, vertices.p)
     return Survey(vertices.value.reshape(shape), vertices.kind.reshape(shape), states, curves)
 

@@ -107,9 +107,13 @@ class Paths(ABC):
     bound: float
     options: TraceOptions
 
-    @abstractmethod
     def __call__(self, settings: Settings) -> Samples:
         """Samples of the map."""
+        return self.follow(self.natural_samples(settings))
+
+    @abstractmethod
+    def follow(self, start: Samples) -> Samples:
+        """Samples at the ends of the paths that begin at natural states; these are replaced."""
 
     @abstractmethod
     def causes(self, pairs: Brackets) -> list[Cause]:

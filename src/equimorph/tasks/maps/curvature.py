@@ -9,13 +9,13 @@ import numpy as np
 
 from equimorph.argument_checks import check_arguments
 from equimorph.array_types import Bool
-from equimorph.arrays import Flags, Settings, Values
+from equimorph.arrays import Flags, Values
 from equimorph.equilibria import TraceOptions
 from equimorph.equilibria.critical import Critical
 from equimorph.equilibria.critical_tests import bound, branching, gap, grazing, quadratic
 from equimorph.equilibria.first_stable import FirstStable
 from equimorph.errors import InputError
-from equimorph.model import Constraint, Descriptor, Grid, Progress, position
+from equimorph.model import Constraint, Descriptor, Grid, Progress, Workers, position
 from equimorph.structures import Structure
 from equimorph.tasks.maps.actuator_map import ActuatorMap, natural_states_over, survey
 from equimorph.tasks.maps.brackets import Brackets, Samples
@@ -95,6 +95,7 @@ def curvature_map(  # noqa: PLR0913  # the knobs of the public face, most by key
     bound: float = 100.0,
     options: TraceOptions | None = None,
     progress: Progress | None = None,
+    workers: Workers | None = None,
 ) -> CurvatureMap:
     """Largest curvature, or another descriptor, of the first stable state at a load.
 
@@ -123,6 +124,8 @@ def curvature_map(  # noqa: PLR0913  # the knobs of the public face, most by key
         Step control.
     progress
         Receives reports on the progress.
+    workers
+        Who follows the paths from the vertices of the grid; see `Workers`.
 
     Returns
     -------
@@ -152,7 +155,7 @@ def curvature_map(  # noqa: PLR0913  # the knobs of the public face, most by key
         options or TraceOptions(), record=False, through_folds=True, through_branch_points=True
     )
     paths = FirstStablePaths(sheet, place, tuple(within), float(bound), options, float(at), shown)
-    found = survey(paths, grid, "paths", progress)
+    found = survey(paths, grid, "paths", progress, workers)
     return CurvatureMap(
         structure, grid, load, paths.within, dict(fixed or {}),
         found.value, found.status, found.states, found.curves, sheet, paths.bound, paths.at, shown,
@@ -174,9 +177,8 @@ class FirstStablePaths(Paths):
     at: float
     descriptor: Descriptor
 
-    def __call__(self, settings: Settings) -> Samples:
-        """Values at settings, with their states and what happens on the way."""
-        start = self.natural_samples(settings)
+    def follow(self, start: Samples) -> Samples:
+        """Values with their states and what happens on the way."""
         z, p, kind = start.z, start.p, start.kind
         value, place = start.value, start.place
         ready = np.flatnonzero(kind == PathStatus.LOST)
@@ -195,7 +197,7 @@ class FirstStablePaths(Paths):
         value[some] = self.descriptor.function(z[some], p[some])
         if self.descriptor.place is not None and len(some):
             place[some] = self.descriptor.place(z[some], p[some])
-        return Samples(settings, value, kind, place, z, p, start.passed)
+        return Samples(start.setting, value, kind, place, z, p, start.passed)
 
     def causes(self, pairs: Brackets) -> list[Cause]:
         """What changes where a state at the given load, or a path that leads to it, ends.

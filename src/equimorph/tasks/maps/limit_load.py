@@ -15,7 +15,7 @@ from equimorph.equilibria.critical import Critical, null_border
 from equimorph.equilibria.critical_tests import bound, branching, gap, grazing, quadratic
 from equimorph.equilibria.trace_options import EventCode, EventKind
 from equimorph.errors import InputError
-from equimorph.model import Constraint, Grid, Progress, position
+from equimorph.model import Constraint, Grid, Progress, Workers, position
 from equimorph.structures import Structure
 from equimorph.tasks.maps.actuator_map import ActuatorMap, natural_states_over, survey
 from equimorph.tasks.maps.brackets import Brackets, Samples
@@ -91,7 +91,7 @@ class LimitLoadMap(ActuatorMap):
 
 
 @check_arguments
-def limit_load_map(
+def limit_load_map(  # noqa: PLR0913  # the knobs of the public face, most by keyword
     structure: Structure,
     grid: Grid,
     load: str,
@@ -101,6 +101,7 @@ def limit_load_map(
     bound: float = 100.0,
     options: TraceOptions | None = None,
     progress: Progress | None = None,
+    workers: Workers | None = None,
 ) -> LimitLoadMap:
     """Limit loads over a grid of settings, with the curves on which they jump or bend.
 
@@ -128,6 +129,8 @@ def limit_load_map(
         Step control.
     progress
         Receives reports on the progress.
+    workers
+        Who follows the paths from the vertices of the grid; see `Workers`.
 
     Returns
     -------
@@ -154,7 +157,7 @@ def limit_load_map(
     rays = LimitLoadRays(sheet, place, tuple(within), float(bound), options)
     # close to a cusp the two folds are close together: shorter steps separate them
     careful = replace(rays, options=options.finer())
-    found = survey(rays, grid, "limit loads", progress, near_curves=careful)
+    found = survey(rays, grid, "limit loads", progress, workers, near_curves=careful)
     return LimitLoadMap(
         structure, grid, load, rays.within, dict(fixed or {}),
         found.value, found.status, found.states, found.curves, sheet, rays.bound,
@@ -165,9 +168,8 @@ def limit_load_map(
 class LimitLoadRays(Paths):
     """Limit loads at settings: rays in the load from natural states."""
 
-    def __call__(self, settings: Settings) -> Samples:
-        """Limit loads at settings, with their states."""
-        start = self.natural_samples(settings)
+    def follow(self, start: Samples) -> Samples:
+        """Limit loads with their states."""
         z, p, kind = start.z, start.p, start.kind
         value, place = start.value, start.place
         ready = np.flatnonzero(kind == RayStatus.LOST)
@@ -188,7 +190,7 @@ class LimitLoadRays(Paths):
                 lateral = events == EventKind.LATERAL_BRANCH_POINT
                 kind[met[lateral]] = RayStatus.LATERAL_BRANCH_POINT
         z[kind <= RayStatus.LOST] = np.nan
-        return Samples(settings, value, kind, place, z, p, start.passed)
+        return Samples(start.setting, value, kind, place, z, p, start.passed)
 
     def causes(self, pairs: Brackets) -> list[Cause]:
         """Merging folds, branch points, and bounds that take over or are touched."""

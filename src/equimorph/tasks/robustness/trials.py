@@ -9,10 +9,21 @@ import numpy as np
 
 from equimorph.argument_checks import check_arguments
 from equimorph.array_types import Bool, Float, Int, Shaped
-from equimorph.arrays import Parameters, Values
+from equimorph.arrays import Lanes, Parameters, Values
+from equimorph.columns import Columns
 from equimorph.equilibria import lift, way_points
 from equimorph.errors import InputError
-from equimorph.model import Constraint, Schedule, names_of, position
+from equimorph.model import (
+    Constraint,
+    Progress,
+    Schedule,
+    Silent,
+    Workers,
+    cut_rows,
+    map_rows,
+    names_of,
+    position,
+)
 from equimorph.structures import State, States
 from equimorph.tasks.start import check_schedule
 
@@ -93,6 +104,8 @@ def random_trials(  # all but three by keyword
     trials: int = 200,
     within: Sequence[Constraint] = (),
     seed: int = 0,
+    progress: Progress | None = None,
+    workers: Workers | None = None,
 ) -> Trials:
     """Execute a schedule with normally distributed errors of parameters.
 
@@ -114,6 +127,10 @@ def random_trials(  # all but three by keyword
         Constraints to obey.
     seed
         Seed of the random numbers.
+    progress
+        Receives reports on the progress.
+    workers
+        Who lifts the trials; see `Workers`.
 
     Returns
     -------
@@ -134,12 +151,50 @@ def random_trials(  # all but three by keyword
     offsets = np.random.default_rng(seed).normal(size=(trials, len(names))) * widths
     shift = np.zeros((trials, len(start.p)))
     shift[:, places] = offsets
-    perfect = States(structure, np.tile(start.z, (trials, 1)), np.tile(start.p, (trials, 1)))
-    every = names_of(structure.parameters)
-    legs = [_leg(every, row + shift) for row in (start.p, *rows)]
-    lifts = lift(perfect, legs, within=within)
-    kind = np.where((lifts.kind != "arrived") & (lifts.at < 1.0), "start", lifts.kind)
-    return Trials(names, offsets, kind, np.maximum(lifts.at - 1.0, 0.0), lifts.states)
+    cuts, sink = cut_rows(trials, workers), progress or Silent()
+    sink.report("trials", 0, len(cuts))
+    ends = map_rows(
+        _Execution(start, rows, tuple(within)), _Errors(shift), cuts, workers,
+        lambda done: sink.report("trials", done, len(cuts)),
+    )  # fmt: skip
+    kind = np.where((ends.kind != "arrived") & (ends.at < 1.0), "start", ends.kind)
+    states = States(structure, ends.z, ends.p)
+    return Trials(names, offsets, kind, np.maximum(ends.at - 1.0, 0.0), states)
+
+
+@dataclass(frozen=True)
+class _Errors(Columns):
+    """Errors of all parameters, one row for each trial."""
+
+    shift: Parameters
+
+
+@dataclass(frozen=True)
+class _Ends(Columns):
+    """How each lift ended, where, and in which state."""
+
+    kind: Shaped[np.ndarray, " trials"]
+    at: Float[np.ndarray, " trials"]
+    z: Lanes
+    p: Parameters
+
+
+@dataclass(frozen=True)
+class _Execution:
+    """Executes a schedule, given by all parameters at its corners, with errors."""
+
+    start: State
+    rows: Parameters
+    within: tuple[Constraint, ...]
+
+    def __call__(self, errors: _Errors) -> _Ends:
+        """Lift one trial beside the other."""
+        structure, shift = self.start.structure, errors.shift
+        z, p = (np.tile(each, (len(shift), 1)) for each in (self.start.z, self.start.p))
+        every = names_of(structure.parameters)
+        legs = [_leg(every, row + shift) for row in (self.start.p, *self.rows)]
+        lifts = lift(States(structure, z, p), legs, within=self.within)
+        return _Ends(lifts.kind, lifts.at, lifts.states.z, lifts.states.p)
 
 
 def _leg(names: tuple[str, ...], p: Parameters) -> dict[str, Values]:
