@@ -1,4 +1,6 @@
-"""Stability margin and largest curvature along a route."""
+"""Stability margin and limited quantities along a route."""
+
+from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -7,7 +9,7 @@ from mpl_toolkits.axes_grid1 import make_axes_locatable
 from equimorph.argument_checks import check_arguments
 from equimorph.array_types import Float, Int
 from equimorph.errors import InputError
-from equimorph.model import Schedule
+from equimorph.model import Constraint, Descriptor, Schedule
 from equimorph.plotting import style
 from equimorph.plotting.curves import corner_steps, path_of, snap_steps
 from equimorph.plotting.labels import descriptor_label
@@ -25,16 +27,18 @@ _MOST_NUMBERS = 12
 
 
 @check_arguments
-def margins(route: Route, ax: Axes | None = None) -> Axes:
-    """Stability margin along a route, and below it max |κ| if the schedule has it.
+def margins(route: Route, ax: Axes | None = None, *, within: Sequence[Constraint] = ()) -> Axes:
+    """Stability margin along a route, and below it what is limited, with its limits.
 
     Parameters
     ----------
     route
         A route with a schedule.
     ax
-        Where to draw the margin; the curvature goes into an axes below it. None makes a figure
-        one column wide.
+        Where to draw the margin; further panels go below it. None makes a figure one column wide.
+    within
+        Bounds to draw, of descriptors that the schedule has; without any max |κ| is drawn alone, if
+        the schedule has it.
 
     Returns
     -------
@@ -48,10 +52,10 @@ def margins(route: Route, ax: Axes | None = None) -> Axes:
     schedule = route.schedule
     if schedule is None:
         raise InputError(f"`route` must have a schedule; got a refused route: {route.why}")
-    curvature = schedule.descriptors.get(_CURVATURE)
+    bounds = _bounds(route, schedule, within)
     with style.house_style():
         if ax is None:
-            height = (0.5 if curvature is None else 0.8) * style.SINGLE_COLUMN
+            height = (0.5 + 0.3 * len(bounds)) * style.SINGLE_COLUMN
             ax = style.new_axes(style.SINGLE_COLUMN, height, _ROOM)
         lowest = ax
         snaps = snap_steps(route)
@@ -60,19 +64,45 @@ def margins(route: Route, ax: Axes | None = None) -> Axes:
         ax.set_ylim(0.0, 1.15 * schedule.margins.max())
         if not len(snaps):  # else it is zero at the snap, as the dotted line says
             _mark(ax, schedule, int(np.argmin(schedule.margins)), schedule.margins)
-        if curvature is not None:
-            # Both share the room that the axes had, whatever laid it out.
-            divider = make_axes_locatable(ax)
+        # All share the room that the axes had, whatever laid it out.
+        divider = make_axes_locatable(ax)
+        for descriptor, limits in bounds.items():
+            lowest.tick_params(labelbottom=False)
             lowest = divider.append_axes("bottom", size="100%", pad=_GAP, sharex=ax)
-            ax.tick_params(labelbottom=False)
-            _draw(lowest, schedule, curvature, _CURVATURE_COLOUR, snaps)
-            descriptor = path_of(route).states.structure.descriptor(_CURVATURE)
+            values = schedule.descriptors[descriptor.name]
+            _draw(lowest, schedule, values, _CURVATURE_COLOUR, snaps)
             lowest.set_ylabel(descriptor_label(descriptor))
-            lowest.set_ylim(0.0, 1.25 * curvature.max())
-            _mark(lowest, schedule, int(np.argmax(curvature)), curvature)
+            _draw_limits(lowest, values, limits)
+            _mark(lowest, schedule, int(np.argmax(np.abs(values))), values)
         lowest.set_xlabel("share of the length of the route")
         _number_way_points(ax, schedule, corner_steps(route))
     return ax
+
+
+def _bounds(
+    route: Route, schedule: Schedule, within: Sequence[Constraint]
+) -> dict[Descriptor, list[float]]:
+    """Descriptors of the schedule to draw, with their limits."""
+    bounds: dict[Descriptor, list[float]] = {}
+    tightest = {(each.descriptor, each.sense): each.bound for each in sorted(within, key=_width)}
+    for (descriptor, _), bound in tightest.items():
+        if descriptor.name in schedule.descriptors:
+            bounds.setdefault(descriptor, []).append(bound)
+    if not bounds and _CURVATURE in schedule.descriptors:
+        bounds[path_of(route).states.structure.descriptor(_CURVATURE)] = []
+    return bounds
+
+
+def _width(constraint: Constraint) -> float:
+    """Greater for what a constraint leaves less room for."""
+    return -constraint.bound if constraint.sense == "<=" else constraint.bound
+
+
+def _draw_limits(ax: Axes, values: Float[np.ndarray, " steps"], limits: list[float]) -> None:
+    low, high = min(0.0, values.min(), *limits), max(0.0, values.max(), *limits)
+    ax.set_ylim(1.25 * low, 1.25 * high)
+    for limit in limits:
+        ax.axhline(limit, **style.LIMIT_LINE)
 
 
 def _draw(

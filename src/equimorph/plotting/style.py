@@ -27,6 +27,7 @@ from mpl_toolkits.axes_grid1 import make_axes_locatable
 
 from equimorph.argument_checks import check_arguments
 from equimorph.array_types import Float
+from equimorph.plotting.fit import whole_figure
 
 MILLIMETRE = 1 / 25.4
 """In inches."""
@@ -173,10 +174,13 @@ def legend_below(ax: Axes, entries: Sequence[Artist], *, room: bool, columns: in
     figure = ax.get_figure(root=True)
     assert figure is not None
     frame = ax.get_position(original=True).height * figure.get_size_inches()[1]
-    ax.legend(
+    made = ax.legend(
         handles=handles, loc="upper center", ncols=columns, borderaxespad=0.0, borderpad=0.0,
         bbox_to_anchor=(0.5, -(_LABELS + 0.5 * _LEGEND_GAP) / frame),
     )  # fmt: skip
+    if room and columns > 1 and made.get_window_extent().width > figure.bbox.width:
+        grow_below(ax, (len(handles) - -(-len(handles) // columns)) * _LEGEND_ROW)
+        legend_below(ax, [], room=False, columns=1)
 
 
 def colour_bar(ax: Axes, shades: ScalarMappable, label: str) -> Any:
@@ -251,6 +255,8 @@ def save(
 ) -> tuple[FilePath, ...]:
     """Write a figure in each format and name the files.
 
+    It grows where legends or names reach beyond it, and has fewer ticks where labels would touch.
+
     Parameters
     ----------
     drawing
@@ -272,8 +278,9 @@ def save(
     folder.mkdir(parents=True, exist_ok=True)
     files = tuple(folder / f"{name}.{extension}" for extension in formats)
     with house_style():
+        box = whole_figure(figure)
         for file in files:
             # No date inside the file: an unchanged picture stays an unchanged file.
             metadata = {"Date": None} if file.suffix == ".svg" else None
-            figure.savefig(file, dpi=RESOLUTION, metadata=metadata)
+            figure.savefig(file, dpi=RESOLUTION, metadata=metadata, bbox_inches=box)
     return files

@@ -73,7 +73,8 @@ def figures_of_way(eset: EquilibriumSet | None, name: str, route: Route, what: s
         f"Shapes at equal steps along the {what}, start to goal.",
     )  # fmt: skip
     margins = still(
-        f"{name}-margins", partial(plotting.margins, route),
+        f"{name}-margins",
+        partial(plotting.margins, route, within=() if eset is None else eset.constraints),
         f"How far each state is from instability along the {what}.",
     )  # fmt: skip
     if eset is None or len(eset.names) != 2:

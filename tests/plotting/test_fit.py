@@ -1,0 +1,123 @@
+"""Figures fit at any size and with long names: nothing leaves them, tick labels stay apart."""
+
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+import pytest
+from matplotlib.transforms import Bbox
+from PIL import Image
+
+import equimorph as em
+from equimorph import plotting
+from equimorph.plotting import style
+from equimorph.plotting.fit import label_boxes, touching, whole_figure
+from typecheck import unchecked
+
+LOAD = "force_that_pushes_the_crown_of_the_arch_down"
+MOVE = "shortening_of_the_left_bar_by_its_actuator"
+SIZES = (0.6, 1.0, 1.8)
+"""Widths and heights relative to what a figure has by itself."""
+
+
+@pytest.fixture(scope="module")
+def truss_set():
+    """A shallow two-bar truss whose parameters have long names."""
+    truss = em.Truss(
+        {"A": (-1, 0), "B": (0, 0.2), "C": (1, 0)}, [("A", "B"), ("B", "C")],
+        {"A": "xy", "C": "xy"}, {LOAD: {"B": (0, -1)}}, {MOVE: {"A-B": 1.0}},
+    )  # fmt: skip
+    box = em.Box(**{LOAD: (-2e-3, 4e-3), MOVE: (-0.01, 0.01)})
+    with unchecked():
+        return em.equilibrium_set(truss, box, intervals=(6, 4), checks=0)
+
+
+@pytest.fixture(scope="module")
+def way(truss_set):
+    stable = truss_set.at(**{LOAD: 0.0, MOVE: 0.0}).stable
+    up = max(stable, key=truss_set.structure.displacement("B", "y"))
+    goal = em.lift(up, {LOAD: 1e-3, MOVE: 5e-3}).end.state
+    return em.plan(truss_set, up, goal)
+
+
+FIGURES = {
+    "surface": lambda eset, _: plotting.surface(eset, eset.structure.displacement("B", "y")),
+    "parameter_plane": plotting.parameter_plane,
+    "solutions": lambda eset, route: plotting.solutions(eset, eset.points[:1]),
+    "margins": lambda _, route: plotting.margins(route),
+    "shapes": lambda _, route: plotting.shapes(route),
+    "schedule_strips": lambda _, route: plotting.schedule_strips(route.schedule),
+    "alternative_routes": lambda eset, route: plotting.alternative_routes(eset, [route, route]),
+}  # fmt: skip
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", FIGURES)
+def test_figures_with_long_names_fit_at_all_sizes(name, truss_set, way):
+    with style.house_style():
+        drawn = FIGURES[name](truss_set, way)
+        figure = drawn if not hasattr(drawn, "figure") else drawn.get_figure(root=True)
+        width, height = figure.get_size_inches()
+        for size in SIZES:
+            figure.set_size_inches(size * width, size * height)
+            check_fit(figure)
+
+
+def check_fit(figure):
+    """Legends, labels and titles lie inside what is saved; tick labels do not touch."""
+    whole = whole_figure(figure) or Bbox.from_bounds(0.0, 0.0, *figure.get_size_inches())
+    pixels = whole.transformed(figure.dpi_scale_trans).padded(1.6)  # borders of letters
+    legends = [*figure.legends, *(ax.get_legend() for ax in figure.axes if ax.get_legend())]
+    boxes = [each.get_window_extent() for each in legends]
+    boxes += [box for ax in figure.axes for axis in (ax.xaxis, ax.yaxis)
+              for box in label_boxes(axis)]  # fmt: skip
+    boxes += [ax.yaxis.label.get_window_extent() for ax in figure.axes if ax.axison]
+    for box in boxes:
+        assert all(pixels.contains(*corner) for corner in (box.min, box.max))
+    for ax in figure.axes:
+        if ax.name == "3d":
+            pairs = product(label_boxes(ax.xaxis), label_boxes(ax.yaxis))
+            assert not any(Bbox.intersection(*pair) for pair in pairs)
+        else:
+            assert not touching(ax.xaxis)
+            assert not touching(ax.yaxis)
+
+
+def test_a_legend_that_is_too_wide_is_saved_whole(tmp_path):
+    with style.house_style():
+        ax = style.new_axes(2.0, 1.5, (0.4, 0.4, 0.1, 0.1))
+        (line,) = ax.plot([0, 1], [0.0, 1.0], label="a long name of what is drawn " * 2)
+        style.legend_below(ax, [line, line], room=True)
+        check_fit(ax.figure)
+    (file,) = style.save(ax, tmp_path, "wide", ["png"])
+    with Image.open(file) as picture:
+        assert picture.width > 2.0 * style.RESOLUTION
+
+
+def test_a_figure_that_fits_keeps_its_size(tmp_path):
+    with style.house_style():
+        ax = style.new_axes(3.0, 2.0, (0.5, 0.5, 0.2, 0.2))
+        ax.plot([0, 1], [0, 1])
+    (file,) = style.save(ax, tmp_path, "plain", ["png"])
+    with Image.open(file) as picture:
+        assert picture.size == (3 * style.RESOLUTION, 2 * style.RESOLUTION)
+
+
+@pytest.mark.parametrize("width", [0.5, 0.8, 1.5])
+def test_tick_labels_are_thinned_out_until_they_stand_apart(width):
+    with style.house_style():
+        ax = style.new_axes(0.3 + width, 1.0, (0.2, 0.4, 0.1, 0.1))
+        ax.plot(np.array([1234567.0, 1234567.9]), [0, 1])
+        ax.ticklabel_format(useOffset=False)
+        whole_figure(ax.figure)
+    assert not touching(ax.xaxis)
+    assert len(label_boxes(ax.xaxis)) >= 1
+
+
+def test_margins_show_limits_with_what_is_limited(route):
+    angle = route.path.states.structure.angle
+    schedule = replace(route.schedule, descriptors={"angle": angle(route.states)})
+    ax = plotting.margins(replace(route, schedule=schedule), within=[angle <= 1.4, angle <= 9.0])
+    lowest = ax.figure.axes[-1]
+    assert [1.4, 1.4] in [list(line.get_ydata()) for line in lowest.lines]
+    assert 1.4 < lowest.get_ylim()[1] < 9.0
