@@ -36,8 +36,8 @@ export function readWords(): Words {
 
 /** Unpack the arrays; see `equimorph.explorer.packing`. */
 export async function readArrays(words: Words): Promise<Arrays> {
-  const text = document.getElementById("arrays")!.textContent!;
-  const packed = Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
+  const text = atob(document.getElementById("arrays")!.textContent!), packed = new Uint8Array(text.length);
+  for (let i = 0; i < text.length; i++) packed[i] = text.charCodeAt(i);
   const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate"));
   const bytes = new Uint8Array(await new Response(stream).arrayBuffer());
   const arrays: Arrays = {};

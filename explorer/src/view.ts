@@ -32,6 +32,7 @@ export class View {
   private parts: Object3D[] = [];
   private overlays: Object3D[] = [];
   private positions = new Float32Array(0);
+  private wide = 0;
   private low = 0;
   private high = 1;
   private marks: { mark: Mark; element: HTMLElement }[] = [];
@@ -219,6 +220,7 @@ export class View {
   resize(): void {
     const { clientWidth: width, clientHeight: height } = this.element;
     if (!width || !height) return;
+    this.wide = width;
     this.renderer.setSize(width, height);
     this.eye.resize(width, height);
     for (const part of [...this.parts, ...this.overlays]) {
@@ -285,7 +287,7 @@ export class View {
     }
     const element = h("span", { class: `label ${kind}`, "aria-hidden": "true" }, text), half = kind === "axis" ? 4 * text.length : 10;
     // names stay inside narrow pictures
-    place(element, [Math.max(half, Math.min(this.element.clientWidth - half, at[0])), at[1]]);
+    place(element, [Math.max(half, Math.min(this.wide - half, at[0])), at[1]]);
     this.overlay.append(element);
     this.labels.push(element);
   }
