@@ -137,7 +137,7 @@ export class EquilibriumSet {
 
   placesOf(cell: number): number[][] { return this.corners(cell).map((v) => Array.from({ length: this.d }, (_, a) => this.place(v, a))); }
 
-  private get scale(): number[] { return this.words.parameters.map((each) => each.upper - each.lower); }
+  get scale(): number[] { return this.words.parameters.map((each) => each.upper - each.lower); }
 
   private cellsNear(p: number[]): Int32Array {
     const bins = (this.bins ??= this.makeBins());

@@ -209,8 +209,9 @@ export class View {
 
   setMarks(marks: Mark[]): void {
     for (const { element } of this.marks) element.remove();
+    const beside = (spot: Spot) => this.level !== null && Math.abs(this.set.parameters(spot)[2] - this.level) > 1e-6 * this.set.scale[2];
     this.marks = marks.map((mark) => {
-      const element = h("span", { class: `mark ${mark.kind}`, title: mark.title, style: `--mark: ${mark.colour}` }, mark.text);
+      const element = h("span", { class: `mark ${mark.kind}${beside(mark.spot) ? " beside" : ""}`, title: mark.title, style: `--mark: ${mark.colour}` }, mark.text);
       this.overlay.append(element);
       return { mark, element };
     });
