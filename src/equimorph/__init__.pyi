@@ -114,6 +114,8 @@ from .equilibria import (
     TransitionNetwork as TransitionNetwork,
     EnergyBarrier as EnergyBarrier,
     EnergyPath as EnergyPath,
+    load_cycle as load_cycle,
+    LoadCycle as LoadCycle,
     Merge as Merge,
 )
 from .manifold import (

@@ -13,6 +13,7 @@ from equimorph.equilibria.energy_barriers import EnergyBarrier, EnergyPath, Merg
 from equimorph.equilibria.legs import Leg, Waypoint
 from equimorph.equilibria.lift import Event, Lifts, Path, check_start, lift, way_points
 from equimorph.equilibria.limit_load import LimitLoad, LimitLoads, limit_load
+from equimorph.equilibria.load_cycles import LoadCycle, load_cycle
 from equimorph.equilibria.paths import lift_legs
 from equimorph.equilibria.random_search import distinct
 from equimorph.equilibria.search import Completeness, FoundStates, find_equilibria, search_points
@@ -40,6 +41,7 @@ __all__ = [
     "Lifts",
     "LimitLoad",
     "LimitLoads",
+    "LoadCycle",
     "Merge",
     "ParameterLine",
     "Path",
@@ -62,6 +64,7 @@ __all__ = [
     "lift",
     "lift_legs",
     "limit_load",
+    "load_cycle",
     "search_points",
     "settle",
     "snap_landing",

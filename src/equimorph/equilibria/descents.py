@@ -56,7 +56,13 @@ class Descents:
     lane: Int[np.ndarray, "2 lanes"]
 
 
-def descend(structure: Structure, z: Lanes, p: Parameters, pace: Pace = QUICK) -> Descents:
+def descend(
+    structure: Structure,
+    z: Lanes,
+    p: Parameters,
+    pace: Pace = QUICK,
+    nudges: tuple[float, ...] = NUDGES,
+) -> Descents:
     """Follow the energy downwards from equilibria, both ways along their softest modes.
 
     The first steps are shares of the length of the mode, so that wells are found however narrow
@@ -65,7 +71,7 @@ def descend(structure: Structure, z: Lanes, p: Parameters, pace: Pace = QUICK) -
     soft = soft_modes(structure, z, p)
     twice = np.tile(np.arange(len(z)), 2)
     modes = np.concatenate([soft.mode, -soft.mode])
-    start = _starts(structure, z[twice], p[twice], soft.take(twice), modes)
+    start = _starts(structure, z[twice], p[twice], soft.take(twice), modes, nudges)
     left = np.flatnonzero(start.leaves)
     rate, moved = soft.rate[twice[left]], start.moved[left]
     flow = gradient_flow(structure, start.z[left], p[twice[left]], rate, moved, pace)
@@ -87,7 +93,12 @@ class _Starts:
 
 
 def _starts(
-    structure: Structure, z: Lanes, p: Parameters, soft: SoftModes, modes: Modes
+    structure: Structure,
+    z: Lanes,
+    p: Parameters,
+    soft: SoftModes,
+    modes: Modes,
+    nudges: tuple[float, ...],
 ) -> _Starts:
     """Configurations near states from which the flow leads away, along modes.
 
@@ -98,7 +109,7 @@ def _starts(
     longest = np.minimum(10.0 / soft.stiffness, 0.3 / growth)
     start, leaves, told = z.copy(), np.zeros(len(z), bool), np.zeros(len(z), bool)
     length = np.zeros(len(z))
-    for size in NUDGES:
+    for size in nudges:
         todo = np.flatnonzero(~leaves)
         for shorter in SHORTER:
             if len(todo) == 0:

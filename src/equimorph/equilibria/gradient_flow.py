@@ -56,23 +56,26 @@ class Pace:
         Newton step to a stable state, relative to the way so far, from which on it is solved for.
     steps
         Most steps of one flow.
+    longest
+        Length of a step, relative to the way so far.
     """
 
     change: float
     near: float
     steps: int
+    longest: float = 0.5
 
 
 FAITHFUL = Pace(change=0.4, near=1e-2, steps=3000)
 """Follows the flow in time, until it is close to its end."""
 QUICK = Pace(change=0.8, near=100.0, steps=400)
 """Looks for the end only: no energy barrier is stepped over."""
+SMOOTH = Pace(change=0.1, near=1e-3, steps=3000, longest=0.1)
+"""Shows the way itself."""
 FIRST_STEP = 0.1
 """In units of the time 1/|eigenvalue| at the start."""
 AIM = 0.6
 """Change of the velocity that the next step aims at, relative to the largest one."""
-LONGEST = 0.5
-"""Length of a step, relative to the way so far."""
 FAILURES = 20
 """Steps, each a quarter of the one before, that may fail one after the other."""
 ITERATIONS = 12
@@ -242,7 +245,7 @@ def _advance(structure: Structure, front: _Front, p: Parameters, pace: Pace) -> 
     # not a number is not downhill
     downhill = after + 0.5 * size**2 / h <= before + slack
     # else states could be stepped over that lie closer together than the step is long
-    short = size <= LONGEST * front.travelled
+    short = size <= pace.longest * front.travelled
     moved = solved & downhill & short & (change <= pace.change)
     # where the flow speeds up, the energy bends down ever more
     growing = np.where(speed > speed_before, 1.0 - change, 1.0)

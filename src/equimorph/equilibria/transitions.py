@@ -13,11 +13,11 @@ import numpy as np
 from equimorph.argument_checks import check_arguments
 from equimorph.array_types import Int
 from equimorph.arrays import Flags, Values
+from equimorph.equilibria.descents import NUDGES, descend
 from equimorph.equilibria.energy_barriers import EnergyBarrier, EnergyPath, Merge
-from equimorph.equilibria.gradient_flow import FAITHFUL
+from equimorph.equilibria.gradient_flow import FAITHFUL, SMOOTH
 from equimorph.equilibria.minima_graph import NONE, Argument, MinimaGraph, arguments_of
 from equimorph.equilibria.search import Completeness, search_with_graph
-from equimorph.equilibria.snap import snap_landing
 from equimorph.equilibria.soft_modes import metric_length
 from equimorph.equilibria.ways import Nowhere, ways_over
 from equimorph.errors import InputError
@@ -187,15 +187,16 @@ class TransitionNetwork:
         None if the minimum does not lie below the saddle.
         """
         row = int(np.flatnonzero(self.saddles == saddle)[0])
-        landings = snap_landing(self.states[saddle])
-        for end, landing in zip(self.ends[row].tolist(), landings, strict=True):
-            if end == goal:
-                return landing.way[1:]
-            if end in self.saddles:
-                onward = self._descent(end, goal)
-                if onward is not None:
-                    parts = landing.way[1:], self.states[end], onward
-                    return join_states(onward.structure, parts)
+        structure, top = self.states.structure, self.states[[saddle]]
+        led = descend(structure, top.z, top.p, SMOOTH, NUDGES[1:])
+        for end, lane in zip(self.ends[row].tolist(), led.lane[:, 0].tolist(), strict=True):
+            onward = self._descent(end, goal) if end in self.saddles else None
+            if end != goal and onward is None:
+                continue
+            points = led.flow.lane(lane).points
+            way = States(structure, points, np.tile(top.p, (len(points), 1)))
+            further = () if onward is None else (self.states[end], onward)
+            return join_states(structure, (way, *further))
         return None
 
     def _barrier(self, saddle: int, start: int, end: int) -> EnergyBarrier:

@@ -20,6 +20,7 @@ from equimorph.plotting.snaps import snap_panels
 from equimorph.plotting.strongest import beside_strongest, strongest_settings
 from equimorph.plotting.style import house_style, save
 from equimorph.plotting.surface import surface
+from equimorph.plotting.transitions import disconnectivity, energy_path
 
 __all__ = [
     "alternative_routes",
@@ -29,6 +30,8 @@ __all__ = [
     "curvature_map",
     "deviation_over_time",
     "diagram",
+    "disconnectivity",
+    "energy_path",
     "film",
     "followed",
     "house_style",

@@ -1,0 +1,160 @@
+"""Figures of transition networks: the disconnectivity graph, and minimum-energy paths."""
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from equimorph.argument_checks import check_arguments
+from equimorph.array_types import Float
+from equimorph.equilibria import EnergyPath, TransitionNetwork
+from equimorph.errors import InputError
+from equimorph.plotting import style
+from equimorph.plotting.labels import with_unit
+from equimorph.plotting.surroundings import Surroundings, frame_shapes
+from equimorph.structures import States
+
+_TREE_ROOM, _PATH_ROOM = (0.66, 0.66, 0.1, 0.1), (0.66, 0.98, 0.1, 0.1)
+"""Inches around the axes: left, bottom, right, top; shapes stand below."""
+_HEIGHT = 2.7
+_BAND, _BELOW_TREE, _BELOW_PATH = 0.3, -0.33, -0.45
+"""Height and bottoms of the shapes, as shares of the height of the axes."""
+_LABEL_PAD = 40.0
+"""Points between the numbers on the axis and its label."""
+_WIDEST = 0.9
+"""Width of a shape, as a share of the distance of two leaves."""
+_MOST_SHAPES = 8
+_BORDER = 0.08
+_HEADROOM = 0.12
+"""Of the energies."""
+_STABLE, _SADDLE = style.index_colour(0), style.index_colour(1)
+
+
+@check_arguments
+def disconnectivity(network: TransitionNetwork, ax: Axes | None = None) -> Axes:
+    """Disconnectivity graph of a network: stable states as leaves, joined where saddles join them.
+
+    The height of a leaf is the energy of the state, that of a bar the energy of the saddle over
+    which two groups of states reach each other. Lines that end at the top have no saddle to others.
+    Shapes stand below the leaves, if there are at most eight.
+
+    Parameters
+    ----------
+    network
+        With at least one stable state.
+    ax
+        Where to draw; None makes a figure one column wide.
+
+    Returns
+    -------
+    The axes.
+
+    Raises
+    ------
+    InputError
+        If the network has no stable state.
+    """
+    if len(network.minima) == 0:
+        raise InputError("`network` must have a stable state; got one without.")
+    energy = network.energy
+    groups = {(int(number),): float(energy[number]) for number in network.minima}
+    order = _order(network)
+    place = {(number,): float(k) for k, number in enumerate(order)}
+    levels = [merge.energy for merge in network.merges]
+    top = max(levels, default=float(energy[network.minima].max()))
+    span = max(top - float(energy[network.minima].min()), 1e-9 * max(1.0, abs(top)))
+    with style.house_style():
+        ax = ax or style.new_axes(style.SINGLE_COLUMN, _HEIGHT, _TREE_ROOM)
+        for merge in network.merges:
+            one, other = merge.one, merge.other
+            for group in (one, other):
+                ax.plot([place[group]] * 2, [groups.pop(group), merge.energy], **_LINE)
+            ends = [place[one], place[other]]
+            ax.plot(ends, [merge.energy] * 2, **_LINE)
+            joined = tuple(sorted(one + other))
+            groups[joined], place[joined] = merge.energy, sum(ends) / 2.0
+            ax.plot(place[joined], merge.energy, "o", color=_SADDLE, mec=style.INK, **_DOT)
+        for group, level in groups.items():
+            ax.plot([place[group]] * 2, [level, top + _HEADROOM * span], **_LINE)
+        for k, number in enumerate(order):
+            ax.plot(k, energy[number], "o", color=_STABLE, mec=style.INK, **_DOT)
+        ax.set_xlim(-0.5, len(order) - 0.5)
+        ax.set_ylim(top - (1.0 + _HEADROOM) * span, top + _HEADROOM * span)
+        ax.set_xticks([])
+        ax.set_ylabel(_energy_label(network.states))
+        leaves = np.arange(len(order), dtype=float)
+        _draw_shapes(ax, network.states[np.array(order)], leaves, _BELOW_TREE)
+    return ax
+
+
+_LINE = {"color": style.INK, "linewidth": 1.1, "zorder": 2, "solid_capstyle": "projecting"}
+_DOT = {"ms": 4.0, "mew": 0.5, "zorder": 3}
+
+
+def _order(network: TransitionNetwork) -> list[int]:
+    """Leaves from left to right, so that bars do not cross lines; the lower group first."""
+    rows = {(int(number),): [int(number)] for number in network.minima}
+    for merge in network.merges:
+        parts = sorted((rows.pop(merge.one), rows.pop(merge.other)), key=min)
+        rows[tuple(sorted(merge.one + merge.other))] = parts[0] + parts[1]
+    return [number for row in rows.values() for number in row]
+
+
+@check_arguments
+def energy_path(path: EnergyPath, ax: Axes | None = None) -> Axes:
+    """Energy along a minimum-energy path, with the shapes of its stable states and saddles.
+
+    Parameters
+    ----------
+    path
+        The path.
+    ax
+        Where to draw; None makes a figure one column wide.
+
+    Returns
+    -------
+    The axes.
+    """
+    minima, saddles = path.minima, path.saddles
+    with style.house_style():
+        ax = ax or style.new_axes(style.SINGLE_COLUMN, _HEIGHT, _PATH_ROOM)
+        ax.plot(path.length, path.states.energy, color=style.INK, linewidth=1.2, zorder=2)
+        marks = []
+        for states, colour in ((minima, _STABLE), (saddles, _SADDLE)):
+            at = np.array([_place(path, z) for z in states.z], dtype=float)
+            ax.plot(at, states.energy, "o", color=colour, mec=style.INK, **_DOT)
+            marks.append(at)
+        ax.margins(y=_HEADROOM)
+        ax.set_ylabel(_energy_label(path.states))
+        ax.set_xlabel("length of the path in the metric", labelpad=_LABEL_PAD)
+        order = np.argsort(np.concatenate(marks))
+        z = np.concatenate([minima.z, saddles.z])[order]
+        p = np.concatenate([minima.p, saddles.p])[order]
+        shown, at = States(path.states.structure, z, p), np.concatenate(marks)[order]
+        step = float(np.diff(at).min(initial=np.inf)) if len(at) > 1 else 1.0
+        ax.set_xlim(at[0] - 0.5 * step, at[-1] + 0.5 * step)
+        _draw_shapes(ax, shown, at, _BELOW_PATH)
+    return ax
+
+
+def _place(path: EnergyPath, z: Float[np.ndarray, " size"]) -> float:
+    """Length of the path up to one of its states."""
+    return float(path.length[np.abs(path.states.z - z).max(axis=1).argmin()])
+
+
+def _energy_label(states: States) -> str:
+    return with_unit("energy $E$", states.structure.descriptor("energy").unit)
+
+
+def _draw_shapes(ax: Axes, states: States, places: Float[np.ndarray, " n"], below: float) -> None:
+    """Draw shapes below the axes, all at one scale, each below its place."""
+    if len(states) > _MOST_SHAPES:
+        return
+    low, high = ax.get_xlim()
+    step = min(float(np.diff(np.sort(places)).min(initial=high - low)), 0.4 * (high - low))
+    for k, place in enumerate(places):
+        frame = (place - 0.5 * _WIDEST * step, below, _WIDEST * step, _BAND)
+        inner = ax.inset_axes(frame, transform=ax.get_xaxis_transform())
+        inner.axis("off")
+        around = Surroundings(states, ())
+        frame_shapes(inner, around, _BORDER)
+        one = Surroundings(states[[k]], ())
+        one.draw_shapes(inner, [style.INK], 2, linewidths=1.2)
