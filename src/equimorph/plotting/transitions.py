@@ -1,5 +1,7 @@
 """Figures of transition networks: the disconnectivity graph, and minimum-energy paths."""
 
+from typing import Any
+
 import numpy as np
 from matplotlib.axes import Axes
 
@@ -25,6 +27,8 @@ _MOST_SHAPES = 8
 _BORDER = 0.08
 _HEADROOM = 0.12
 """Of the energies."""
+Group = tuple[int, ...]
+"""Numbers of the stable states of a group of basins."""
 _STABLE, _SADDLE = style.index_colour(0), style.index_colour(1)
 
 
@@ -55,9 +59,9 @@ def disconnectivity(network: TransitionNetwork, ax: Axes | None = None) -> Axes:
     if len(network.minima) == 0:
         raise InputError("`network` must have a stable state; got one without.")
     energy = network.energy
-    groups = {(int(number),): float(energy[number]) for number in network.minima}
+    groups: dict[Group, float] = {(int(k),): float(energy[k]) for k in network.minima}
     order = _order(network)
-    place = {(number,): float(k) for k, number in enumerate(order)}
+    place: dict[Group, float] = {(number,): float(k) for k, number in enumerate(order)}
     levels = [merge.energy for merge in network.merges]
     top = max(levels, default=float(energy[network.minima].max()))
     span = max(top - float(energy[network.minima].min()), 1e-9 * max(1.0, abs(top)))
@@ -85,13 +89,18 @@ def disconnectivity(network: TransitionNetwork, ax: Axes | None = None) -> Axes:
     return ax
 
 
-_LINE = {"color": style.INK, "linewidth": 1.1, "zorder": 2, "solid_capstyle": "projecting"}
-_DOT = {"ms": 4.0, "mew": 0.5, "zorder": 3}
+_LINE: dict[str, Any] = {
+    "color": style.INK,
+    "linewidth": 1.1,
+    "zorder": 2,
+    "solid_capstyle": "projecting",
+}
+_DOT: dict[str, Any] = {"ms": 4.0, "mew": 0.5, "zorder": 3}
 
 
 def _order(network: TransitionNetwork) -> list[int]:
     """Leaves from left to right, so that bars do not cross lines; the lower group first."""
-    rows = {(int(number),): [int(number)] for number in network.minima}
+    rows: dict[Group, list[int]] = {(int(k),): [int(k)] for k in network.minima}
     for merge in network.merges:
         parts = sorted((rows.pop(merge.one), rows.pop(merge.other)), key=min)
         rows[tuple(sorted(merge.one + merge.other))] = parts[0] + parts[1]
