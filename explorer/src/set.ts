@@ -180,18 +180,34 @@ export class EquilibriumSet {
     return { start, cells, counts };
   }
 
-  /** All equilibria over a point, by energy; those of neighbouring cells on a common side once. */
+  /**
+   * All equilibria over a point, by energy; those of neighbouring cells on a common side once.
+   *
+   * A cell that lies overturned between two of its sheet, as next to cusps, counts minus one time: it takes the state most like its own away.
+   */
   over(p: number[]): Spot[] {
-    const found: Spot[] = [], energy = this.named("energy"), same = 2e-3 * this.words.size;
+    const { overturned } = this.arrays, alike = (a: Spot, b: Spot) => this.cellIndex[a.cell] === this.cellIndex[b.cell], energy = this.named("energy");
+    let upright = this.covering(p).sort((a, b) => overturned[a.cell] - overturned[b.cell]);
+    for (const each of upright.filter((spot) => overturned[spot.cell])) {
+      const others = upright.filter((other) => !overturned[other.cell] && alike(other, each)), gaps = others.map((other) => this.unlike(this.shown(other), this.shown(each)));
+      const nearest = others[gaps.indexOf(Math.min(...gaps))];
+      if (nearest) upright = upright.filter((spot) => spot !== each && spot !== nearest);
+    }
+    return upright.sort((a, b) => this.scalar(energy, a) - this.scalar(energy, b));
+  }
+
+  /** States of all cells over a point. */
+  private covering(p: number[]): Spot[] {
+    const found: Spot[] = [], { overturned } = this.arrays, same = 2e-3 * this.words.size;
     for (const cell of this.cellsNear(p)) {
       const w = this.weights(cell, p);
       if (!w || Math.min(...w) < -SLACK) continue;
       const spot = this.inCell(cell, w);
       const edge = Math.min(...w) < 1e-4;
-      if (edge && found.some((each) => this.cellIndex[each.cell] === this.cellIndex[cell] && this.unlike(each, spot) < same)) continue;
+      if (edge && found.some((each) => this.cellIndex[each.cell] === this.cellIndex[cell] && overturned[each.cell] === overturned[cell] && this.unlike(each, spot) < same)) continue;
       found.push(spot);
     }
-    return found.sort((a, b) => this.scalar(energy, a) - this.scalar(energy, b));
+    return found;
   }
 
   // --- neighbours and walks ---------------------------------------------------------------------

@@ -87,6 +87,19 @@ def test_states_of_the_page_are_those_of_the_closed_form(spring):
         assert (1.0 - 0.8 / np.cos(d)) * np.sin(d) == pytest.approx(0.05, abs=3e-4)
 
 
+def test_as_many_states_are_listed_as_there_are(spring):
+    """Three inside the cusp, one outside: next to its tip, too, where cells lie overturned."""
+    rng = np.random.default_rng(5)
+    near = np.array([1.0, 0.0]) + rng.uniform(-1.0, 1.0, (300, 2)) * [0.05, 0.01]
+    places = np.concatenate([near, rng.uniform([0.5, -0.25], [1.3, 0.25], (100, 2))])
+    fold = np.where(places[:, 0] < 1.0, _fold_load(np.minimum(places[:, 0], 1.0)), 0.0)
+    clear = np.abs(np.abs(places[:, 1]) - fold) > 2e-3
+    found = spring(
+        "(places) => places.map((p) => explorer.set.over(p).length)", places[clear].tolist()
+    )
+    assert found == np.where(np.abs(places[clear, 1]) < fold[clear], 3, 1).tolist()
+
+
 def test_a_drag_stops_at_the_fold_and_shows_the_landing(spring):
     """The spring at x_l = 0.8 loses its stability at F = (1 − 0.8^⅔)^{3/2}.
 

@@ -21,8 +21,7 @@ import numpy as np
 
 from equimorph.array_types import Bool, Float, Int
 from equimorph.charts.arrangement import arrange, cross, outline, sides, winding, winding_raster
-from equimorph.manifold import EquilibriumSet
-from equimorph.manifold.geometry.topology import adjacency, senses
+from equimorph.manifold import EquilibriumSet, overturned_cells
 
 Counts = Int[np.ndarray, " edges"]
 Flags = Bool[np.ndarray, " edges"]
@@ -116,8 +115,7 @@ def count_regions(
 
 def count_equilibria(eset: EquilibriumSet, *, stable_only: bool = False) -> Regions:
     """Exact regions of the plane of two free parameters by the number of equilibria over them."""
-    whole = adjacency(eset.cells)
-    overturned = senses(eset.cells, eset.cell_index, eset.coordinates, whole).overturned
+    overturned = overturned_cells(eset)
     chosen = eset.cell_index == 0 if stable_only else np.ones(len(eset.cells), bool)
     return count_regions(eset.coordinates, eset.cells[chosen], overturned[chosen])
 

@@ -18,7 +18,7 @@ from equimorph.explorer.curved_edges import curved_edges
 from equimorph.explorer.packing import quantise
 from equimorph.explorer.pictures import gallery
 from equimorph.explorer.study_text import study_text
-from equimorph.manifold import EquilibriumSet, SnapGraph
+from equimorph.manifold import EquilibriumSet, SnapGraph, overturned_cells
 from equimorph.model import Constraint, Descriptor, Disc, Obstacle
 from equimorph.plotting.curves import corner_steps, snap_steps
 from equimorph.plotting.support_symbols import AWAY, SYMBOLS, UPRIGHT
@@ -95,6 +95,7 @@ def contents(asked: Question) -> tuple[dict[str, Any], Arrays]:
         "cells": eset.cells.astype(np.int32),
         "cell_index": np.minimum(eset.cell_index, 255).astype(np.uint8),
         "bent": middles.ends.astype(np.int32),
+        "overturned": overturned_cells(eset).astype(np.uint8),
         "stratum": eset.stratum.astype(np.int32),
         "component": eset.component.astype(np.int32),
         "folds": _facets(eset.folds, d),

@@ -2,6 +2,7 @@
 
 from equimorph.manifold.build import INTERVALS, equilibrium_set
 from equimorph.manifold.complex.audit import Audit
+from equimorph.manifold.complex.description import overturned_cells
 from equimorph.manifold.complex.equilibrium_set import (
     Boundary,
     BoundaryKind,
@@ -65,6 +66,7 @@ __all__ = [
     "level_set",
     "lift_to",
     "locate",
+    "overturned_cells",
     "part",
     "refine",
     "restricted",

@@ -257,6 +257,12 @@ def _audit(
     )
 
 
+def overturned_cells(eset: EquilibriumSet) -> CellFlags:
+    """Return which cells project against the orientation that their index demands."""
+    whole = adjacency(eset.cells)
+    return senses(eset.cells, eset.cell_index, eset.coordinates, whole).overturned
+
+
 def wrong_cells(eset: EquilibriumSet) -> CellFlags:
     """Return which cells of a set without crossings `Audit.wrong` counts."""
     coordinates, scales = eset.coordinates, eset.setting.scales
