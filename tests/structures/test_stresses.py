@@ -7,6 +7,7 @@ import pytest
 
 import equimorph as em
 from equimorph.errors import MissingError
+from equimorph.structures.quantities import find_descriptor
 
 STEEL = em.Strip("20 mm", "0.5 mm", E="210 GPa", nu=0.3)
 UNITS = {"force": "N", "length": "mm"}
@@ -87,6 +88,12 @@ def test_strain_of_other_rods_is_refused(rod, words):
 def test_a_strength_is_a_positive_stress(strip, strength):
     with pytest.raises(em.InputError, match="strength"):
         strip.safety_factor(strength)
+
+
+def test_errors_that_list_descriptors_list_those_of_every_structure():
+    for structure in (em.Spring(), em.Rod()):
+        with pytest.raises(em.InputError, match=r"energy.*, stability_margin, abs\(…\).*; got 'x'"):
+            find_descriptor(structure, "x")
 
 
 def test_efforts_have_symbols_and_units(strip):

@@ -29,6 +29,12 @@ EFFORTS = {
 }
 """Symbols of efforts by unit: couples M, forces F, and the travel δ of forces, which they lose."""
 
+GENERIC = (
+    *("a parameter", "effort(parameter)", "stability_margin", "abs(…)", "distance(…)"),
+    *("outside(…)", "shape_x(s)", "shape_y(s)"),
+)
+"""What texts may mean of every structure, for messages."""
+
 
 @remember_call
 @check_arguments
@@ -196,7 +202,14 @@ def find_descriptor(structure: Structure, text: str) -> Descriptor:
     called = _CALL.fullmatch(name)
     if called and called[1] in _FORMS:
         return _FORMS[called[1]](structure, called[2])
-    return structure.descriptor(text)
+    try:
+        return structure.descriptor(text)
+    except InputError as error:
+        own, got, rest = str(error).partition("; got ")
+        if not own.startswith("`descriptor` must be one of"):
+            raise
+        more = ", ".join(each for each in GENERIC if each not in own)
+        raise InputError(f"{own}, {more}{got}{rest}") from None
 
 
 def _effort(structure: Structure, inner: str) -> Descriptor:

@@ -1,0 +1,33 @@
+"""The notebooks run, and print what they show."""
+
+from pathlib import Path
+
+import nbformat
+import pytest
+from nbclient import NotebookClient
+
+NOTEBOOKS = sorted((Path(__file__).parents[1] / "docs" / "notebooks").glob("*.ipynb"))
+
+
+def printed(notebook: nbformat.NotebookNode) -> list[list[str]]:
+    """Kinds of the outputs of each cell of code, and what is printed."""
+    cells = [cell for cell in notebook.cells if cell.cell_type == "code"]
+    return [
+        [str(each.get("text", sorted(each.get("data", {})))) for each in cell.outputs]
+        for cell in cells
+    ]
+
+
+def test_there_are_three_notebooks():
+    assert [file.stem for file in NOTEBOOKS] == ["arch", "strip", "truss"]
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore")  # of the messages between notebook and kernel
+@pytest.mark.parametrize("file", NOTEBOOKS, ids=lambda file: file.stem)
+def test_a_notebook_runs_and_prints_what_it_shows(file):
+    shown = nbformat.read(file, as_version=4)
+    again = nbformat.from_dict(shown)
+    NotebookClient(again, timeout=300, kernel_name="python3").execute()
+    assert printed(again) == printed(shown)
+    assert any("image/png" in each for outputs in printed(shown) for each in outputs)
