@@ -9,7 +9,7 @@ export interface Portrait { spot: Spot; colour: string; dash: string; main: bool
 type Point = number[];
 const RADIUS = 0.022;
 const HEAD = 0.028;
-const SAMPLES = 160;
+const SAMPLES = 80;
 /** Pixels of letters. */
 const LETTERS = 13;
 

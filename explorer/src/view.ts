@@ -33,6 +33,7 @@ export class View {
   private overlays: Object3D[] = [];
   private positions = new Float32Array(0);
   private wide = 0;
+  private tall = 0;
   private low = 0;
   private high = 1;
   private marks: { mark: Mark; element: HTMLElement }[] = [];
@@ -220,8 +221,8 @@ export class View {
 
   resize(): void {
     const { clientWidth: width, clientHeight: height } = this.element;
-    if (!width || !height) return;
-    this.wide = width;
+    if (!width || !height || (width === this.wide && height === this.tall)) return;
+    [this.wide, this.tall] = [width, height];
     this.renderer.setSize(width, height);
     this.eye.resize(width, height);
     for (const part of [...this.parts, ...this.overlays]) {
@@ -234,7 +235,7 @@ export class View {
   request(): void {
     if (this.asked) return;
     this.asked = true;
-    requestAnimationFrame(() => this.draw());
+    requestAnimationFrame(() => { if (this.asked) this.draw(); });
   }
 
   /** Draw now. */
