@@ -45,6 +45,17 @@ def test_inside_out_under_a_limit_on_curvature(arch_set, ends, wish):
     assert refused.why.startswith("the goal violates max_curvature <= 6: max_curvature = 10.549")
 
 
+def test_a_descriptor_counts_like_the_margin(arch_set, routes):
+    """∫ ds/d: with the stability margin for d this is clearance."""
+    structure, states = arch_set.structure, routes["length"].path.states
+    margin = objective_of(em.margin_of(structure), structure)
+    cost = objective_of("clearance", structure).along(states)
+    assert margin.along(states) == pytest.approx(cost, rel=1e-9)
+    both = objective_of([(1.0, "clearance"), (2.0, em.margin_of(structure))], structure)
+    assert both.along(states) == pytest.approx(3.0 * cost, rel=1e-9)
+    assert str(both) == "clearance + 2 length/stability_margin"
+
+
 def test_routes_say_what_they_are_for(routes):
     assert all(route.arrived for route in routes.values())
     assert {name: route.objective for name, route in routes.items()} == {n: n for n in WISHES}
@@ -106,7 +117,10 @@ def test_load_may_be_steered_where_it_is_a_free_parameter(spring_set):
 @pytest.mark.parametrize(
     ("wish", "message"),
     [
-        ("lenght", "`objective` must be made of length, travel, work, clearance or Rates; got "),
+        (
+            "lenght",
+            "`objective` must be made of length, travel, work, clearance, Rates or descriptors; ",
+        ),
         ([], "`objective` must have at least one term; got none."),
         ([(0.0, "work")], "`objective` must have positive weights; got 0.0."),
         ([(float("nan"), "work")], "`objective` must have positive weights; got nan."),
@@ -118,3 +132,14 @@ def test_load_may_be_steered_where_it_is_a_free_parameter(spring_set):
 def test_wishes_without_meaning_are_input_errors(arch_set, ends, wish, message):
     with unchecked(), pytest.raises(InputError, match=f"^{re.escape(message)}"):
         plan(arch_set, *ends, objective=wish)
+
+
+@pytest.mark.slow
+def test_a_route_for_barriers_can_be_knocked_harder(arch_set, ends):
+    """The smallest barrier grows from below 1e-3 to above 0.04."""
+    with unchecked():
+        field = em.barriers(arch_set)
+        short, safe = (plan(arch_set, *ends, objective=o) for o in ("length", field.descriptor))
+        least = [field.of(route.states).energy.min() for route in (short, safe)]
+    assert least[0] < 1e-3
+    assert least[1] > 0.04

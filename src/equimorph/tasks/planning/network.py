@@ -1,6 +1,6 @@
 """The stable cells of a set as a network of straight lifts, computed once for all routes."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -192,7 +192,7 @@ class Network:
         self._allowed: dict[tuple[tuple[Constraint, ...], float], Flags] = {}
         self._broken: dict[tuple[tuple[Constraint, ...], float, bool], Flags] = {}
         self._lifted: dict[tuple[tuple[Constraint, ...], float, bool], Flags] = {}
-        self._costs: dict[str, Values] = {}
+        self._costs: dict[Hashable, Values] = {}
 
     def admissible(self, eset: EquilibriumSet, demands: Demands) -> Bool[np.ndarray, " V"]:
         """Vertices of stable cells, off the folds, that obey the demands."""
@@ -206,7 +206,7 @@ class Network:
 
     def costs(self, eset: EquilibriumSet, objective: Objective) -> Values:
         """Cost of each link, along its chord."""
-        key = repr(objective)
+        key = objective.key
         if key not in self._costs:
             # margins of unstable vertices would be for nothing
             used, pairs = np.unique(self.pairs, return_inverse=True)

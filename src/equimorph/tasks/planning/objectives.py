@@ -1,6 +1,6 @@
 """What a route minimises: length, travel, work, time, nearness to instability."""
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Annotated, Literal, get_args
@@ -10,17 +10,17 @@ import numpy as np
 from equimorph.argument_kinds import ANYTHING, short
 from equimorph.array_types import Float, Int
 from equimorph.errors import InputError, suggestion
-from equimorph.model import Rates, Schedule, names_of
+from equimorph.model import Descriptor, Rates, Schedule, names_of
 from equimorph.structures import States, Structure, stability_margin
 
 Values = Float[np.ndarray, " pairs"]
 Numbers = Int[np.ndarray, " pairs"]
 Name = Literal["length", "travel", "work", "clearance"]
-Term = Name | Rates
+Term = Name | Rates | Descriptor
 
 NAMES: tuple[Name, ...] = get_args(Name)
 LEAST_MARGIN = 1e-6
-"""Margin below which clearance counts no further."""
+"""Margin, or value of a descriptor, below which clearance counts no further."""
 EXACT, NEAR, ROUGH = 1e-11, 1e-4, 1e-2
 """Relative errors of margins: in results, where paths are compared, and on a mesh."""
 
@@ -29,12 +29,13 @@ EXACT, NEAR, ROUGH = 1e-11, 1e-4, 1e-2
 class Places:
     """States, with the quantities that an objective needs at each of them.
 
-    Efforts of the parameters and reciprocal margins, empty where they do not count.
+    Efforts of the parameters, and reciprocals of margins and descriptors, a column for each term;
+    empty where they do not count.
     """
 
     states: States
     efforts: Float[np.ndarray, "lanes efforts"]
-    nearness: Float[np.ndarray, "lanes margins"]
+    nearness: Float[np.ndarray, "lanes terms"]
 
     def __getitem__(self, key: slice | Int[np.ndarray, " some"]) -> "Places":
         """Some of them."""
@@ -55,8 +56,8 @@ class Objective:
 
     Terms: "length" in the metric (configuration and scaled parameters); "travel", the length of the
     path of the scaled parameters; "work", ``Σᵢ ∫|∂L/∂aᵢ daᵢ|``, of actuators that recover no
-    energy; "clearance", ``∫ ds/margin``, large near instability; `Rates`, the time that
-    limited rates take.
+    energy; "clearance", ``∫ ds/margin``, large near instability; a `Descriptor` d with positive
+    values, ``∫ ds/d``, large where it is small; `Rates`, the time that limited rates take.
 
     Parameters
     ----------
@@ -69,8 +70,7 @@ class Objective:
     def __str__(self) -> str:
         """Return the words that define it."""
         words = [
-            f"{'' if weight == 1.0 else f'{weight:g} '}{term if isinstance(term, str) else 'time'}"
-            for weight, term in self.terms
+            f"{'' if weight == 1.0 else f'{weight:g} '}{_word(term)}" for weight, term in self.terms
         ]
         return " + ".join(words)
 
@@ -81,8 +81,13 @@ class Objective:
 
     @cached_property
     def needs_margins(self) -> bool:
-        """Whether stability margins count."""
-        return any(term == "clearance" for _, term in self.terms)
+        """Whether stability margins count, or values of descriptors in their place."""
+        return any(_is_near(term) for _, term in self.terms)
+
+    @property
+    def key(self) -> Hashable:
+        """What costs of links depend on."""
+        return repr(self), tuple(term for _, term in self.terms if isinstance(term, Descriptor))
 
     def places(self, states: States, error: float = NEAR) -> Places:
         """States with the quantities that it needs, margins up to a relative error."""
@@ -91,15 +96,24 @@ class Objective:
         if any(term == "work" for _, term in self.terms):
             efforts = structure.effort(states.z, states.p) * structure.energy_scale
         if self.needs_margins:
-            margins = states.margin if error == EXACT else _margins(states, error)
-            nearness = 1.0 / np.maximum(margins, LEAST_MARGIN)[:, None]
+            values = [
+                term(states) if isinstance(term, Descriptor) else _margins(states, error)
+                for _, term in self.terms
+                if _is_near(term)
+            ]
+            nearness = 1.0 / np.maximum(np.stack(values, axis=1), LEAST_MARGIN)
         return Places(states, efforts, nearness)
 
     def between(self, first: Places, second: Places) -> Values:
         """Cost of the short way from each of the first to each of the second, trapezoidal."""
-        total = np.zeros(len(first.states))
+        total, column = np.zeros(len(first.states)), 0
         for weight, term in self.terms:
-            total += weight * _cost(term, first, second)
+            if _is_near(term):
+                near = 0.5 * (first.nearness + second.nearness)[:, column]
+                total += weight * _cost("length", first, second) * near
+                column += 1
+            else:
+                total += weight * _cost(term, first, second)
         return total
 
     def costs(self, states: States, first: Numbers, second: Numbers, error: float = NEAR) -> Values:
@@ -133,7 +147,7 @@ def objective_of(wish: Wish, structure: Structure) -> Objective:
         For an unknown name, a weight that is not positive, or rates of unknown parameters.
     """
     given = wish.terms if isinstance(wish, Objective) else wish
-    single = isinstance(given, str | Rates) or not isinstance(given, Sequence)
+    single = isinstance(given, str | Rates | Descriptor) or not isinstance(given, Sequence)
     terms = [(1.0, given)] if single else list(given)  # type: ignore[arg-type]
     checked: list[tuple[float, Term]] = []
     for entry in terms:
@@ -145,9 +159,10 @@ def objective_of(wish: Wish, structure: Structure) -> Objective:
                 raise InputError(
                     f"`objective` must limit parameters ({known}); got {unknown[0]!r}."
                 )
-        elif term not in NAMES:
+        elif not isinstance(term, Descriptor) and term not in NAMES:
             raise InputError(
-                f"`objective` must be made of {', '.join(NAMES)} or Rates; got {short(term)}."
+                f"`objective` must be made of {', '.join(NAMES)}, Rates or descriptors; got "
+                f"{short(term)}."
                 f"{suggestion(str(term), NAMES)}"
             )
         checked.append((weight, term))
@@ -169,7 +184,20 @@ def _pair(entry: object) -> tuple[float, Term]:
     return number, term
 
 
+def _word(term: Term) -> str:
+    if isinstance(term, Descriptor):
+        return f"length/{term.name}"
+    return term if isinstance(term, str) else "time"
+
+
+def _is_near(term: Term) -> bool:
+    """Whether lengths are divided by a margin or a descriptor."""
+    return term == "clearance" or isinstance(term, Descriptor)
+
+
 def _margins(states: States, error: float) -> Float[np.ndarray, " lanes"]:
+    if error == EXACT:
+        return states.margin
     return stability_margin(states.structure, states.z, states.p, error)
 
 
@@ -186,10 +214,7 @@ def _cost(term: Term, first: Places, second: Places) -> Values:
         return np.asarray(np.sqrt(travel))
     n = structure.unknowns
     dz = second.states.z[:, :n] - first.states.z[:, :n]
-    length = np.sqrt(dz**2 @ structure.mass + travel)
-    if term == "length":
-        return np.asarray(length)
-    return np.asarray(length * 0.5 * (first.nearness + second.nearness)[:, 0])
+    return np.asarray(np.sqrt(dz**2 @ structure.mass + travel))
 
 
 def _times(rates: Rates, names: Sequence[str], dp: Float[np.ndarray, "pairs params"]) -> Values:

@@ -67,10 +67,10 @@ def plan(  # noqa: PLR0913  # the knobs of the public face, most by keyword
         Smallest stability margin allowed, in the structure's metric.
     objective
         What the route minimises: "length" (metric), "travel" (scaled parameters), "work" (of
-        actuators that recover no energy), "clearance" (``∫ ds/margin``), `Rates` (time; the
-        schedule then has times), or a sum ``[(1, "length"), (0.2, "work")]``; see `Objective`. The
-        result is a local minimum near the best path over the mesh; from goal to start it is the
-        same, backwards.
+        actuators that recover no energy), "clearance" (``∫ ds/margin``), a descriptor d like the
+        energy barrier (``∫ ds/d``), `Rates` (time; the schedule then has times), or a sum
+        ``[(1, "length"), (0.2, "work")]``; see `Objective`. The result is a local minimum near the
+        best path over the mesh; from goal to start it is the same, backwards.
     snap_price
         Cost of a snap-through in units of the objective; None forbids them. With a price the route
         may leave its stable stratum over a fold and continue where the snap lands: `route.snaps`
