@@ -59,7 +59,8 @@ def bench_states_of_a_reduction(benchmark, large):
 
 
 @pytest.mark.parametrize("rule", [em.quasi_static, em.first_stable_on_path])
-def bench_reductions_by_paths_over_24_by_41_intervals(benchmark, rule):
-    eset = arch_set((24, 41))
+@pytest.mark.parametrize("intervals", [(24, 41), (93, 161)], ids=str)
+def bench_reductions_by_paths(benchmark, rule, intervals):
+    eset = arch_set(intervals)
     chart = benchmark.pedantic(em.reduce, (eset,), {"prefer": rule("q")}, rounds=2)
     benchmark.extra_info.update(barriers=len(chart.barriers), lost=chart.lost)

@@ -1,12 +1,12 @@
 """The choice of a rule over points and at states, and the part of a set that it prefers."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import permutations
 
 import numpy as np
 
-from equimorph.array_types import Float
+from equimorph.array_types import Bool, Float
 from equimorph.arrays import (
     CellFlags,
     Flags,
@@ -37,11 +37,10 @@ DIFFERENT = 1e-4
 BESIDE, MOVED = 0.02, 0.3
 """Distance from a fold, in lengths of edges, at which the preference is examined, and the largest
 distance of its state there: at a cusp it is the cube root of the first."""
-PARTS, ROUNDS = 5, 11
-"""Parts and rounds of the division of edges: the change is located to 5⁻¹¹ = 2e-8 of an edge."""
+PARTS, ROUNDS = 3, 16
+"""Parts and rounds of the division of edges: the change is located to 3⁻¹⁶ = 2e-8 of an edge."""
 
 Solved = tuple[Lanes, Parameters, ItemFlags]
-Way = Callable[[Items, ItemValues], Solved]
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,14 +132,9 @@ class _Crossings:
         for side in of_cells.T:
             np.minimum.at(lowest, side, fabric.cell_index)
         self._base = len(fabric.vertices)
-        keys, found = [np.zeros(0, int)], fabric.vertices.take(np.zeros(0, int))
-        for mark in np.unique(marks[crossed]).tolist():
-            own = np.flatnonzero(crossed & (marks == mark))
-            given = ends[own], mark, lowest[own], values[ends[own]]
-            done, new = _locate_changes(preference, fabric, *given)
-            keys.append(keys_of(ends[own[done]], self._base))
-            found = found.join(new)
-        self._keys, self._found = np.concatenate(keys), found
+        way = _Straight(fabric, ends[crossed], marks[crossed], lowest[crossed])
+        done, self._found = _locate_changes(preference, way, values[ends[crossed]])
+        self._keys = keys_of(way.ends[done], self._base)
 
     def between(
         self, fabric: Fabric, ends: Ends, mark: int, index: Items, known: Float[np.ndarray, "n 2"]
@@ -207,18 +201,15 @@ def _preferred_beside(preference: Preference, met: Items) -> ItemFlags:
 
 
 def _locate_changes(
-    preference: Preference,
-    fabric: Fabric,
-    ends: Ends,
-    mark: int,
-    index: Items,
-    values: Float[np.ndarray, "n 2"],
+    preference: Preference, way: "_Straight", values: Float[np.ndarray, "n 2"]
 ) -> tuple[ItemFlags, Vertices]:
-    """Vertices on edges where the preference changes first on the way from their first ends."""
-    way = _straight(fabric, ends, mark, index)
-    low, high = np.zeros(len(ends)), np.ones(len(ends))
+    """Vertices on edges where the preference changes first on the way from their first ends.
+
+    All edges are divided together: a batch of paths takes less than several small ones.
+    """
+    low, high = np.zeros(len(way.ends)), np.ones(len(way.ends))
     first: ItemFlags = values[:, 0] < 0.0
-    todo: Items = np.arange(len(ends))
+    todo: Items = np.arange(len(way.ends))
     shares = np.arange(1, PARTS) / PARTS
     for _ in range(ROUNDS):
         if len(todo) == 0:
@@ -226,7 +217,7 @@ def _locate_changes(
         step = (high - low)[todo]
         at = low[todo, None] + step[:, None] * shares
         lanes = np.repeat(todo, len(shares))
-        z, p, good = way(lanes, at.ravel())
+        z, p, good = way.states(lanes, at.ravel())
         same = np.zeros(len(lanes), bool)
         same[good] = preference.prefers(z[good], p[good]) == first[lanes[good]]
         good, same = good.reshape(at.shape), same.reshape(at.shape)
@@ -236,36 +227,52 @@ def _locate_changes(
         low[todo] += passed * step / PARTS
         high[todo] = low[todo] + step / PARTS
         todo = todo[known]
-    done = np.zeros(len(ends), bool)
-    z, p, good = way(todo, 0.5 * (low + high)[todo])
+    done = np.zeros(len(way.ends), bool)
+    z, p, good = way.states(todo, 0.5 * (low + high)[todo])
     done[todo[good]] = True
-    return done, _vertices(fabric, ends[done], index[done], z[good], p[good])
+    own = way.ends[done], way.index[done]
+    return done, _vertices(way.fabric, *own, z[good], p[good])
 
 
-def _straight(fabric: Fabric, ends: Ends, mark: int, wanted: Items) -> Way:
-    """States over straight lines between the ends of edges; those on constraints stay on them."""
-    store, structure = fabric.vertices, fabric.setting.structure
-    folded = np.isin(store.kinds[ends], (VertexKind.FOLD, VertexKind.CORNER))
-    bent = np.full(len(ends), bool(mark & (FacetMark.CAP | FacetMark.FOLD))) | folded.all(axis=1)
+@dataclass(frozen=True)
+class _Straight:
+    """States over straight lines between the ends of edges; those on constraints stay on them.
 
-    def way(lanes: Items, t: ItemValues) -> Solved:
+    marks, index: the facet marks of the edges, and the index of the states between their ends.
+    """
+
+    fabric: Fabric
+    ends: Ends
+    marks: Items
+    index: Items
+
+    @cached_property
+    def _folded(self) -> Bool[np.ndarray, "edges 2"]:
+        """Which ends lie on folds."""
+        return np.isin(self.fabric.vertices.kinds[self.ends], (VertexKind.FOLD, VertexKind.CORNER))
+
+    def states(self, lanes: Items, t: ItemValues) -> Solved:
+        """States at shares t of some edges, their parameters, and whether they were found."""
+        store, ends = self.fabric.vertices, self.ends[lanes]
+        folded, marks = self._folded[lanes], self.marks[lanes]
         weights = np.stack([1.0 - t, t], axis=1)
-        p = np.einsum("nk,nkp->np", weights, store.p[ends[lanes]])
-        some = np.flatnonzero(folded[lanes].any(axis=1) & ~folded[lanes].all(axis=1))
-        weights[some] = root_weights(weights[some], folded[lanes[some]])
-        z = np.einsum("nk,nki->ni", weights, store.z[ends[lanes]])
+        p = np.einsum("nk,nkp->np", weights, store.p[ends])
+        some = np.flatnonzero(folded.any(axis=1) & ~folded.all(axis=1))
+        weights[some] = root_weights(weights[some], folded[some])
+        z = np.einsum("nk,nki->ni", weights, store.z[ends])
         good = np.zeros(len(lanes), bool)
-        plain = np.flatnonzero(~bent[lanes])
+        bent = (marks & (FacetMark.CAP | FacetMark.FOLD) != 0) | folded.all(axis=1)
+        plain = np.flatnonzero(~bent)
+        structure = self.fabric.setting.structure
         z[plain], good[plain], index = exact_states(structure, z[plain], p[plain])
-        good[plain] &= index == wanted[lanes[plain]]
-        rest = np.flatnonzero(~good)
-        if len(rest):
-            some = lanes[rest]
-            found, at = on_edges(fabric, Places(ends[some], mark, wanted[some], t[rest]))
+        good[plain] &= index == self.index[lanes[plain]]
+        left = ~good
+        for mark in np.unique(marks[left]).tolist():
+            rest = np.flatnonzero(left & (marks == mark))
+            places = Places(ends[rest], mark, self.index[lanes[rest]], t[rest])
+            found, at = on_edges(self.fabric, places)
             z[rest[found]], p[rest[found]], good[rest] = at.z, at.p, found
         return z, p, good
-
-    return way
 
 
 def _vertices(fabric: Fabric, ends: Ends, index: Items, z: Lanes, p: Parameters) -> Vertices:
