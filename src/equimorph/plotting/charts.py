@@ -146,6 +146,7 @@ def _draw_above(ax: Any, eset: EquilibriumSet, height: Descriptor) -> None:
     for axis in (ax.xaxis, ax.yaxis, ax.zaxis):
         axis.set_major_locator(MaxNLocator(3))
     ax.zaxis.labelpad = _PAD
+    ax.patch.set_visible(False)  # else it covers labels of the panel beside it
     if ax.get_legend() is not None:
         ax.get_legend().remove()
 
