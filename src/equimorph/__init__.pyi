@@ -183,6 +183,7 @@ from .tasks.planning.planner import (
     plan as plan,
 )
 from .tasks.route import (
+    Bottleneck as Bottleneck,
     Route as Route,
 )
 from .tasks.planning.route_classes import (
@@ -196,6 +197,8 @@ from .tasks.planning.sampling import (
     SamplingOptions as SamplingOptions,
 )
 from .tasks.planning.objectives import (
+    peak as peak,
+    least as least,
     Objective as Objective,
 )
 from .model import (

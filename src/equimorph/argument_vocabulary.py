@@ -54,7 +54,9 @@ def count(least: int, most: float = MANY) -> Range:
 
 WHOLE = count(0, np.inf)
 RANGES: Mapping[str, Range] = {
-    **dict.fromkeys(("accuracy", "snap_price", "tolerance", "most", "reach", "distance"), POSITIVE),
+    **dict.fromkeys(
+        ("accuracy", "snap_price", "slack", "tolerance", "most", "reach", "distance"), POSITIVE
+    ),
     **dict.fromkeys(
         ("tolerances", "spreads", "offsets", "could_measure", "sizes", "limits", "errors"), POSITIVE
     ),

@@ -12,7 +12,7 @@ from equimorph.structures import State, States, Structure
 from equimorph.tables import units_of
 from equimorph.tasks.route import Route
 
-ABOUT, EVENTS, SCHEDULE, SNAPS = "about", "events", "schedule", "snaps"
+ABOUT, EVENTS, SCHEDULE, SNAPS, BOTTLENECK = "about", "events", "schedule", "snaps", "bottleneck"
 
 
 def write_route(group: h5py.Group, route: Route) -> None:
@@ -28,6 +28,8 @@ def write_route(group: h5py.Group, route: Route) -> None:
         _write_schedule(group.create_group(SCHEDULE), route.schedule)
     if route.snaps:
         write_value(group.create_group(SNAPS), route.snaps)
+    if route.bottleneck is not None:
+        write_value(group.create_group(BOTTLENECK), route.bottleneck)
 
 
 def read_route(group: h5py.Group, owner: Owner) -> Route:
@@ -44,6 +46,7 @@ def read_route(group: h5py.Group, owner: Owner) -> Route:
         path=_read_path(group, owner.structure) if "z" in group else None,
         schedule=_read_schedule(group[SCHEDULE]) if SCHEDULE in group else None,
         snaps=read_value(group[SNAPS], owner) if SNAPS in group else (),
+        bottleneck=read_value(group[BOTTLENECK], owner) if BOTTLENECK in group else None,
     )
 
 

@@ -21,6 +21,42 @@ FINE = TraceOptions(largest_step=0.02, first_step=0.01, turning=0.05, steps=2000
 Corners = list[dict[str, float]]
 
 
+BottleneckKind = Literal["start", "goal", "saddle", "kink", "fold", "box", "constraint", "vertex"]
+
+
+@dataclass(frozen=True, eq=False)
+class Bottleneck:
+    """Where routes cannot avoid the largest, or least, value of a descriptor.
+
+    Parameters
+    ----------
+    value
+        Lowest peak of all stable routes within the constraints, or highest least value. On a fold
+        routes come as near to it as they like.
+    state
+        The state that has it.
+    kind
+        "start" or "goal", if one of these has it; else a pass: a smooth "saddle", a "kink" of the
+        descriptor, on a "fold", a side of the "box", or a "constraint"; "vertex" where no exact
+        pass was found near the vertex of the set that decides: the value errs like the mesh.
+    residual
+        Length of the weighted sum of the active gradients along the set; zero at ends, nan at
+        vertices.
+    active
+        Bounds that hold with equality.
+    """
+
+    value: float
+    state: State
+    kind: BottleneckKind
+    residual: float = 0.0
+    active: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        """Value, kind and place."""
+        return f"Bottleneck({self.value:.8g}: {self.kind} at {self.state.parameters})"
+
+
 @dataclass(frozen=True)
 class Route:
     """A verified route between two states, or the reason why none was found.
@@ -28,8 +64,9 @@ class Route:
     status: "arrived", or "refused" with the reason in `why`. A route that arrived was lifted again
     at a finer step: `path`, its smallest stability `margin`, its `length` in the structure's metric
     and scaled parameters, what it was planned for (`objective`) and its `cost`, and the `schedule`
-    for the actuators. Where snaps were allowed, `snaps` has their landings, in order. A refused
-    route carries the path as far as it went, if there is one.
+    for the actuators. Where snaps were allowed, `snaps` has their landings, in order; where a peak
+    was kept low, `bottleneck` has its exact value and place, and `cost` what the route attains. A
+    refused route carries the path as far as it went, if there is one.
     """
 
     status: Literal["arrived", "refused"]
@@ -42,6 +79,7 @@ class Route:
     objective: str = "length"
     cost: float = np.nan
     snaps: tuple[Landing, ...] = ()
+    bottleneck: Bottleneck | None = None
 
     def __repr__(self) -> str:
         """Length and margin, or why there is no route."""
@@ -57,6 +95,8 @@ class Route:
         rows: list[list[Any]] = [["length", self.length], ["smallest margin", self.margin]]
         if self.objective != "length":
             rows.append([self.objective, self.cost])
+        if self.bottleneck is not None:
+            rows.append([f"best possible: {self.bottleneck.kind}", self.bottleneck.value])
         rows += [["snaps", len(self.snaps)], ["way-points", len(self.way_points)]]
         for number, place in enumerate(self.way_points, 1):
             words = ", ".join(f"{name} = {value:.6g}" for name, value in place.items())

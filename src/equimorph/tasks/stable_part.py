@@ -32,12 +32,15 @@ def from_cache(eset: EquilibriumSet, key: Any, compute: Callable[[], Any]) -> An
     return known[key]
 
 
-def vertex_values(eset: EquilibriumSet, descriptor: Descriptor) -> Float[np.ndarray, " V"]:
-    """Values of a descriptor at the vertices of a set."""
-    found = from_cache(
-        eset, ("values", descriptor), lambda: descriptor.function(eset.points.z, eset.points.p)
-    )
-    return np.asarray(found)
+def stable_values(eset: EquilibriumSet, descriptor: Descriptor) -> Float[np.ndarray, " V"]:
+    """Values of a descriptor at the vertices of stable cells; not a number at the others."""
+
+    def compute() -> Float[np.ndarray, " V"]:
+        values, some = np.full(len(eset.points), np.nan), np.flatnonzero(stable_vertices(eset))
+        values[some] = descriptor.function(eset.points.z[some], eset.points.p[some])
+        return values
+
+    return np.asarray(from_cache(eset, ("values", descriptor), compute))
 
 
 def stable_vertices(eset: EquilibriumSet) -> Bool[np.ndarray, " V"]:
@@ -60,7 +63,7 @@ def feasible_vertices(
     good = stable_vertices(eset)
     for constraint in within:
         sign = 1.0 if constraint.sense == "<=" else -1.0
-        excess = sign * (vertex_values(eset, constraint.descriptor) - constraint.bound)
+        excess = sign * (stable_values(eset, constraint.descriptor) - constraint.bound)
         good &= excess <= SLACK * constraint.size
     return good
 

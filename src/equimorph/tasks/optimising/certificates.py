@@ -6,9 +6,9 @@ from typing import Literal
 
 import numpy as np
 
-from equimorph.array_types import Float
+from equimorph.array_types import Float, Int
 from equimorph.tasks.optimising.programme import Programme, is_stability
-from equimorph.tasks.optimising.sqp import LocalMinimum
+from equimorph.tasks.optimising.sqp import CriticalPoint
 
 ACTIVE = 1e-7
 """Relative distance from a bound at which it is active."""
@@ -57,7 +57,7 @@ class Certificate:
         return f"Certificate({self.kind}{': ' + held if held else ''}; KKT {self.residual:.1e})"
 
 
-def certificate(programme: Programme, found: LocalMinimum) -> Certificate:
+def certificate(programme: Programme, found: CriticalPoint) -> Certificate:
     """Conditions at a point where a descent ended."""
     e, answer = found.expansion, found.answer
     f, g = e.f[0], e.g[0]
@@ -68,15 +68,13 @@ def certificate(programme: Programme, found: LocalMinimum) -> Certificate:
     slopes = np.concatenate([e.f_slope[0, tied], e.g_slope[0, active]])
     weights = np.concatenate([answer.weights[tied], answer.multipliers[active]])
     names = [str(programme.all[k]) for k in active]
-    bend = np.einsum("m,mij->ij", answer.weights, e.f_bend[0])
-    bend += np.einsum("k,kij->ij", answer.multipliers, e.g_bend[0])
     ridge = _ridge(e.f_slope[0, tied])
     return Certificate(
         _kind(programme, active.tolist(), ridge is not None),
         float(np.linalg.norm(weights @ slopes)),
         dict(zip(names, answer.multipliers[active].tolist(), strict=True)),
         _places(programme, found, tied.tolist()),
-        _curvature(bend, e.f_slope[0, tied], e.g_slope[0, active]),
+        float(curvatures(found, tied, active)[0].min(initial=np.inf)),
         ridge,
         found.converged,
     )
@@ -106,26 +104,28 @@ def _ridge(slopes: Float[np.ndarray, "tied d"]) -> tuple[float, float] | None:
     return float(rates.max()), float(-rates.min())
 
 
-def _places(programme: Programme, found: LocalMinimum, tied: list[int]) -> dict[float, float]:
+def _places(programme: Programme, found: CriticalPoint, tied: list[int]) -> dict[float, float]:
     if not programme.objective.kinked:
         return {}
     _, places = programme.objective.branches(found.point.z, found.point.p)
     return {float(places[0, k]): float(found.answer.weights[k]) for k in tied}
 
 
-def _curvature(
-    bend: Float[np.ndarray, "d d"],
-    f_slope: Float[np.ndarray, "tied d"],
-    g_slope: Float[np.ndarray, "active d"],
-) -> float:
-    rows = np.concatenate([f_slope[1:] - f_slope[:1], g_slope])
-    d = bend.shape[0]
-    if len(rows) == 0:
-        free = np.eye(d)
-    else:
+def curvatures(
+    found: CriticalPoint, tied: Int[np.ndarray, " m"], active: Int[np.ndarray, " n"]
+) -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, "d k"]]:
+    """Curvatures of the Lagrangian along directions that leave active functions as they are.
+
+    In growing order, and the directions that have them.
+    """
+    e = found.expansion
+    slopes = e.f_slope[0, tied]
+    rows = np.concatenate([slopes[1:] - slopes[:1], e.g_slope[0, active]])
+    free = np.eye(rows.shape[1])
+    if len(rows):
         _, sizes, directions = np.linalg.svd(rows)
         rank = int((sizes > 1e-5 * max(1.0, sizes[0])).sum())
         free = directions[rank:].T
-    if free.shape[1] == 0:
-        return np.inf
-    return float(np.linalg.eigvalsh(free.T @ (0.5 * (bend + bend.T)) @ free)[0])
+    bend = e.bend(0, found.answer)
+    values, vectors = np.linalg.eigh(0.5 * free.T @ (bend + bend.T) @ free)
+    return values, free @ vectors

@@ -17,7 +17,7 @@ from equimorph.model import Constraint, Descriptor
 from equimorph.tasks.optimising.programme import Objective, Programme
 from equimorph.tasks.optimising.sqp import descend
 from equimorph.tasks.optimising.tangent_steps import project_onto_set, step_along, tangents_at
-from equimorph.tasks.stable_part import vertex_values
+from equimorph.tasks.stable_part import stable_values
 
 DIVISIONS = {1: 8, 2: 5, 3: 3}
 """Parts of a side of a cell between sample places, by dimension."""
@@ -108,7 +108,7 @@ def _excesses(
 ) -> Float[np.ndarray, "K V"]:
     """Relative excess over bounds at the vertices."""
     rows = [
-        (1.0 if c.sense == "<=" else -1.0) * (vertex_values(eset, c.descriptor) - c.bound) / c.size
+        (1.0 if c.sense == "<=" else -1.0) * (stable_values(eset, c.descriptor) - c.bound) / c.size
         for c in constraints
     ]
     return np.array(rows).reshape(len(constraints), len(eset.points))

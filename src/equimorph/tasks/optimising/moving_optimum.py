@@ -25,7 +25,7 @@ from equimorph.tasks.optimising.optimum_path import (
     next_trial,
 )
 from equimorph.tasks.optimising.programme import Objective, Programme, is_stability, stability
-from equimorph.tasks.optimising.sqp import ITERATIONS, LocalMinimum, descend
+from equimorph.tasks.optimising.sqp import ITERATIONS, CriticalPoint, descend
 from equimorph.tasks.optimising.tangent_steps import project_onto_set, step_along, tangent_plane_at
 from equimorph.tasks.route import schedule_of
 from equimorph.tasks.start import Start, check_stable, start_state
@@ -175,7 +175,7 @@ class _Found:
 
     time: float
     programme: Programme
-    end: LocalMinimum
+    end: CriticalPoint
     certificate: Certificate
 
     @property

@@ -8,7 +8,6 @@ import numpy as np
 
 from equimorph.argument_checks import check_arguments
 from equimorph.array_types import Bool
-from equimorph.equilibria import settle
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.queries.nearest import SetPoints, local_minima, points_at_vertices
@@ -22,21 +21,16 @@ from equimorph.tasks.optimising.feasible_starts import (
     least_violation,
 )
 from equimorph.tasks.optimising.programme import Objective, Programme, is_stability, stability
-from equimorph.tasks.optimising.sqp import LocalMinimum, descend
-from equimorph.tasks.optimising.tangent_steps import (
-    project_onto_set,
-    step_along,
-    tangent_plane_at,
-    unconstrained_setting,
-)
+from equimorph.tasks.optimising.sqp import CriticalPoint, descend
+from equimorph.tasks.optimising.tangent_steps import move_into_box, tangent_plane_at
 from equimorph.tasks.planning.planner import plan
 from equimorph.tasks.route import Route
 from equimorph.tasks.stable_part import (
     feasible_vertices,
     stable_edges,
     stable_piece,
+    stable_values,
     stable_vertices,
-    vertex_values,
 )
 from equimorph.tasks.start import (
     check_cells,
@@ -212,7 +206,7 @@ def optimise(  # the knobs of the public face, all by keyword
     found = [_optimum(programme, end) for end in ends]
     if start is not None and found:
         goals = [
-            _in_the_box(eset, _before_the_edge(programme, end) or each.state)
+            move_into_box(eset, _before_the_edge(programme, end) or each.state)
             for end, each in zip(ends, found, strict=True)
         ]
         reached = _first_reachable(eset, ground, start, goals, within, margin)
@@ -287,7 +281,7 @@ def _best_vertices(
 ) -> SetPoints:
     """Allowed vertices that no allowed neighbour beats, the best first."""
     goal = programme.objective
-    value = goal.sign * vertex_values(eset, goal.descriptor)
+    value = goal.sign * stable_values(eset, goal.descriptor)
     edges = stable_edges(eset)
     edges = edges[allowed[edges].all(axis=1)]
     alone = np.setdiff1d(np.flatnonzero(allowed), edges)
@@ -295,9 +289,9 @@ def _best_vertices(
     return points_at_vertices(eset, both[np.argsort(value[both], kind="stable")][:CANDIDATES])
 
 
-def _optima(programme: Programme, ends: list[LocalMinimum]) -> list[LocalMinimum]:
+def _optima(programme: Programme, ends: list[CriticalPoint]) -> list[CriticalPoint]:
     """Different feasible ends, the best first."""
-    structure, feasible = programme.setting.structure, list[LocalMinimum]()
+    structure, feasible = programme.setting.structure, list[CriticalPoint]()
     for end in sorted(ends, key=lambda each: float(each.expansion.f.max())):
         stable = structure.index(end.point.z, end.point.p)[0] == 0
         on_edge = any(
@@ -312,7 +306,7 @@ def _optima(programme: Programme, ends: list[LocalMinimum]) -> list[LocalMinimum
     return [feasible[k] for k in distinct(States(structure, points.z, points.p), SAME_SOLUTION)]
 
 
-def _optimum(programme: Programme, end: LocalMinimum) -> Optimum:
+def _optimum(programme: Programme, end: CriticalPoint) -> Optimum:
     state = State(programme.setting.structure, end.point.z[0], end.point.p[0])
     value = programme.objective.descriptor(state)
     return Optimum(state, value, certificate(programme, end))
@@ -340,27 +334,10 @@ def _first_reachable(
     return None
 
 
-def _before_the_edge(programme: Programme, end: LocalMinimum) -> State | None:
-    """State a little inside the stability boundary, if the point is on it.
-
-    Inside all bounds that are active there, so that none is violated on the way back.
-    """
+def _before_the_edge(programme: Programme, end: CriticalPoint) -> State | None:
+    """State a little inside the stability boundary, if the point is on it."""
     active = np.flatnonzero(np.abs(end.expansion.g[0]) < FEASIBLE)
-    if not any(is_stability(programme.all[k]) for k in active):
-        return None
-    slopes = end.expansion.g_slope[0, active]
-    slopes = slopes / np.maximum(np.linalg.norm(slopes, axis=1, keepdims=True), 1e-300)
-    step, *_ = np.linalg.lstsq(slopes, np.full(len(active), -STEP_BACK), rcond=1e-6)
-    spot = SetPoints(end.point.z, end.point.p, end.point.rows)
-    guess = step_along(programme.setting, spot, end.frames, step[None])
-    there, good = project_onto_set(programme.setting, *guess, spot.rows)
-    return State(programme.setting.structure, there.z[0], there.p[0]) if good[0] else None
-
-
-def _in_the_box(eset: EquilibriumSet, state: State) -> State:
-    """State whose parameters do not exceed the box by rounding."""
-    box, free = eset.box, unconstrained_setting(eset).free
-    p = state.p.copy()
-    p[free] = np.clip(p[free], box.lower, box.upper)
-    inside = settle(state.structure, state.z[None], p[None])
-    return State(state.structure, inside.z[0], p) if inside.found[0] else state
+    on_edge = any(is_stability(programme.all[k]) for k in active)
+    inside = end.inside(np.zeros((1, end.frames.shape[1])), np.array([STEP_BACK]))
+    there, good = end.beside(programme.setting, inside)
+    return there[0] if on_edge and good[0] else None

@@ -13,6 +13,7 @@ from equimorph.manifold.geometry.setting import Setting
 from equimorph.manifold.queries.nearest import SetPoints
 from equimorph.model import Constraint, Descriptor
 from equimorph.structures import Structure, margin_of, value_of
+from equimorph.tasks.optimising.quadratic import QuadraticStep
 from equimorph.tasks.optimising.tangent_steps import (
     project_onto_set,
     step_along,
@@ -119,6 +120,11 @@ class Expansion:
     g_slope: Float[np.ndarray, "lanes k d"]
     g_bend: Float[np.ndarray, "lanes k d d"]
     known: Flags
+
+    def bend(self, k: int, answer: QuadraticStep) -> Float[np.ndarray, "d d"]:
+        """Second derivatives, at one of the points, of the Lagrangian with given multipliers."""
+        out = np.einsum("m,mij->ij", answer.weights, self.f_bend[k])
+        return np.asarray(out + np.einsum("k,kij->ij", answer.multipliers, self.g_bend[k]))
 
 
 @dataclass(frozen=True)

@@ -108,7 +108,7 @@ def _first(problem: Quadratic, size: int, more: int) -> QuadraticStep | None:
     rows = np.array(list(combinations(range(k), more)), int).reshape(comb(k, more), more)
     first, second = np.divmod(np.arange(len(own) * len(rows)), max(len(rows), 1))
     own, rows = own[first], rows[second]
-    x, regular = _kkt_points(problem, own, rows)
+    x, regular = kkt_points(problem, own, rows)
     step, level = x[:, :d], x[:, d]
     good = regular & (x[:, d + 1 :] >= -NEGATIVE).all(axis=1)
     room = SLACK * (1.0 + np.abs(problem.f).max())
@@ -124,7 +124,7 @@ def _first(problem: Quadratic, size: int, more: int) -> QuadraticStep | None:
     return QuadraticStep(step[at], weights, multipliers)
 
 
-def _kkt_points(
+def kkt_points(
     problem: Quadratic, own: Int[np.ndarray, "sets size"], rows: Int[np.ndarray, "sets more"]
 ) -> tuple[Float[np.ndarray, "sets unknowns"], Bool[np.ndarray, " sets"]]:
     """Step, level and multipliers with functions and constraints active; where they are unique."""

@@ -20,7 +20,7 @@ from equimorph.structures import State, States
 from equimorph.tasks.optimising.certificates import Certificate, certificate
 from equimorph.tasks.optimising.optimum import Optimum, Sense, optimise
 from equimorph.tasks.optimising.programme import Objective, Programme, stability
-from equimorph.tasks.optimising.sqp import LocalMinimum, descend
+from equimorph.tasks.optimising.sqp import CriticalPoint, descend
 from equimorph.tasks.optimising.tangent_steps import tangent_plane_at
 from equimorph.tolerances import FEASIBLE
 
@@ -248,7 +248,7 @@ def _edge_programme(question: _Question, number: int) -> Programme:
     return Programme.over(eset, Objective(goal, 1.0), own)
 
 
-def _edge(programme: Programme, corner: Corner, end: LocalMinimum) -> _End:
+def _edge(programme: Programme, corner: Corner, end: CriticalPoint) -> _End:
     state = State(programme.setting.structure, end.point.z[0], end.point.p[0])
     found = certificate(programme, end)
     return _End(state, float(end.expansion.f.max()), corner.offsets, found, False)

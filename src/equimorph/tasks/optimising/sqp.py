@@ -7,10 +7,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from equimorph.array_types import Float
-from equimorph.arrays import Frames
-from equimorph.manifold.geometry.setting import embed
+from equimorph.array_types import Float, Int
+from equimorph.arrays import Frames, ItemFlags
+from equimorph.manifold.geometry.setting import Setting, embed
 from equimorph.manifold.queries.nearest import SetPoints
+from equimorph.structures import States
 from equimorph.tasks.optimising.programme import Expansion, Programme
 from equimorph.tasks.optimising.quadratic import Quadratic, QuadraticStep, solve
 from equimorph.tasks.optimising.tangent_steps import project_onto_set, step_along, tangents_at
@@ -33,8 +34,8 @@ FLAT = 1e-4
 
 
 @dataclass(frozen=True)
-class LocalMinimum:
-    """A point at which no step makes the objective smaller.
+class CriticalPoint:
+    """A point at which the conditions of Karush, Kuhn and Tucker hold: an optimum, or a pass.
 
     Parameters
     ----------
@@ -56,9 +57,34 @@ class LocalMinimum:
     answer: QuadraticStep
     converged: bool
 
+    @property
+    def binding(self) -> tuple[Int[np.ndarray, " m"], Int[np.ndarray, " k"]]:
+        """Functions and bounds whose multipliers are not zero."""
+        return np.flatnonzero(self.answer.weights), np.flatnonzero(self.answer.multipliers)
+
+    def beside(self, setting: Setting, steps: Float[np.ndarray, "n d"]) -> tuple[States, ItemFlags]:
+        """States of the set above steps along its tangents, and which of them were found."""
+        lanes = np.zeros(len(steps), int)
+        here = self.point.take(lanes)
+        guess = step_along(setting, here, self.frames[lanes], steps)
+        there, good = project_onto_set(setting, *guess, here.rows)
+        return States(setting.structure, there.z, there.p), good
+
+    def inside(
+        self, steps: Float[np.ndarray, "n d"], distance: Float[np.ndarray, " n"]
+    ) -> Float[np.ndarray, "n d"]:
+        """Steps moved to distances, in the metric, inside all active bounds; to second order."""
+        e = self.expansion
+        active = np.flatnonzero(np.abs(e.g[0]) < FEASIBLE)
+        size = np.maximum(np.linalg.norm(e.g_slope[0, active], axis=1), 1e-300)
+        bent = 0.5 * np.einsum("ni,kij,nj->kn", steps, e.g_bend[0, active], steps)
+        gap = distance + bent / size[:, None]
+        back, *_ = np.linalg.lstsq(e.g_slope[0, active] / size[:, None], -gap, rcond=1e-6)
+        return np.asarray(steps + back.T)
+
 
 @dataclass(frozen=True)
-class _Iterate:
+class Iterate:
     """Points of all lanes that still move, with tangents and derivatives there."""
 
     points: SetPoints
@@ -66,16 +92,16 @@ class _Iterate:
     expansion: Expansion
 
     @classmethod
-    def at(cls, programme: Programme, points: SetPoints) -> "_Iterate":
+    def at(cls, programme: Programme, points: SetPoints) -> "Iterate":
         """Expand the programme at points."""
         frames, points = tangents_at(programme.setting, points)
         return cls(points, frames, programme.expand(points, frames))
 
-    def minimum(self, k: int, answer: QuadraticStep, converged: bool) -> LocalMinimum:
+    def minimum(self, k: int, answer: QuadraticStep, converged: bool) -> CriticalPoint:
         """Lane `k` as a point from which no step is made."""
         expansion = Expansion(*(column[k : k + 1] for column in vars(self.expansion).values()))
         points = self.points.take(np.array([k]))
-        return LocalMinimum(points, self.frames[k : k + 1], expansion, answer, converged)
+        return CriticalPoint(points, self.frames[k : k + 1], expansion, answer, converged)
 
 
 @dataclass
@@ -86,14 +112,14 @@ class _Lane:
     reach: float = LONGEST
     penalty: float = 1.0
     answer: QuadraticStep | None = None
-    done: LocalMinimum | None = None
+    done: CriticalPoint | None = None
     best: SetPoints | None = None
     least: float = np.inf
 
 
 def descend(
     programme: Programme, starts: SetPoints, rounds: int = ITERATIONS
-) -> list[LocalMinimum]:
+) -> list[CriticalPoint]:
     """Local minima from starts; those that lead nowhere are left out.
 
     Those that still move after all rounds end at their best feasible points, not converged.
@@ -108,7 +134,7 @@ def descend(
         for k in set(range(len(todo))) - set(alone):
             todo[k].reach = 0.0
         todo, here = [todo[k] for k in alone], here.take(np.array(alone))
-        iterate = _Iterate.at(programme, here)
+        iterate = Iterate.at(programme, here)
         _remember(todo, iterate)
         answers = [_answer(iterate.expansion, k, lane) for k, lane in enumerate(todo)]
         _advance(programme, todo, iterate, answers)
@@ -116,7 +142,7 @@ def descend(
     return [lane.done for lane in lanes if lane.done is not None]
 
 
-def _remember(todo: list[_Lane], at: _Iterate) -> None:
+def _remember(todo: list[_Lane], at: Iterate) -> None:
     """Keep the best feasible point of each lane."""
     for k, lane in enumerate(todo):
         value = float(at.expansion.f[k].max())
@@ -135,7 +161,7 @@ def _stop(programme: Programme, lanes: list[_Lane]) -> None:
     if not left:
         return
     best = [lane.best for lane in left if lane.best is not None]
-    iterate = _Iterate.at(programme, SetPoints.concatenate(best))
+    iterate = Iterate.at(programme, SetPoints.concatenate(best))
     for k, lane in enumerate(left):
         answer = _answer(iterate.expansion, k, lane)
         if answer is not None:
@@ -162,10 +188,8 @@ def _answer(expansion: Expansion, k: int, lane: _Lane) -> QuadraticStep | None:
         known = solve(model, lane.reach)
     if known is None:
         return _restoration_step(model, lane.reach)
-    bend = np.einsum("m,mij->ij", known.weights, expansion.f_bend[k])
-    bend += np.einsum("k,kij->ij", known.multipliers, expansion.g_bend[k])
     if expansion.known[k]:
-        model = replace(model, hessian=_positive(bend))
+        model = replace(model, hessian=_positive(expansion.bend(k, known)))
     return solve(model, lane.reach) or _restoration_step(model, lane.reach)
 
 
@@ -185,7 +209,7 @@ def _restoration_step(model: Quadratic, reach: float) -> QuadraticStep:
 
 
 def _advance(
-    programme: Programme, todo: list[_Lane], at: _Iterate, answers: list[QuadraticStep | None]
+    programme: Programme, todo: list[_Lane], at: Iterate, answers: list[QuadraticStep | None]
 ) -> None:
     """Move every lane by its step, shortened until its merit falls."""
     steps: dict[int, QuadraticStep] = {}
@@ -223,7 +247,7 @@ def _steepness(expansion: Expansion, k: int) -> float:
 def _try_steps(
     programme: Programme,
     todo: list[_Lane],
-    at: _Iterate,
+    at: Iterate,
     steps: dict[int, Float[np.ndarray, " d"]],
     share: float,
 ) -> list[int]:

@@ -6,6 +6,7 @@ import numpy as np
 
 from equimorph.array_types import Float
 from equimorph.arrays import Flags, Frames, Lanes, Parameters, Rows
+from equimorph.equilibria import settle
 from equimorph.equilibria.sensitivity import answers
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.geometry.exact_points import Aim, correct_points
@@ -54,3 +55,12 @@ def project_onto_set(
     aim = Aim(setting, False, False, span, embed(setting, z, p), rows)
     pinned = correct_points(aim, z, p, np.full(len(z), FAR))
     return SetPoints(pinned.z, pinned.p, rows), pinned.found
+
+
+def move_into_box(eset: EquilibriumSet, state: State) -> State:
+    """State whose parameters do not exceed the box by rounding."""
+    box, free = eset.box, unconstrained_setting(eset).free
+    p = state.p.copy()
+    p[free] = np.clip(p[free], box.lower, box.upper)
+    inside = settle(state.structure, state.z[None], p[None])
+    return State(state.structure, inside.z[0], p) if inside.found[0] else state

@@ -72,6 +72,11 @@ class Demands:
         for factor, share in (*RESERVES, EXACT) if self.margin > 0.0 else (EXACT, *RESERVES):
             yield replace(self, margin=min(self.margin * factor + least * share, least))
 
+    def beyond(self, eset: EquilibriumSet) -> tuple[Constraint, ...]:
+        """Constraints that the cells of a set do not obey anyway."""
+        exact = (replace(each, ease=0.0) for each in self.constraints)
+        return tuple(each for each in exact if each not in eset.constraints)
+
     @property
     def options(self) -> TraceOptions:
         """Step control of the lifts."""

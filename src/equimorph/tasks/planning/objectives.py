@@ -7,10 +7,11 @@ from typing import Annotated, Literal, get_args
 
 import numpy as np
 
+from equimorph.argument_checks import check_arguments
 from equimorph.argument_kinds import ANYTHING, short
 from equimorph.array_types import Float, Int
 from equimorph.errors import InputError, suggestion
-from equimorph.model import Descriptor, Rates, Schedule, names_of
+from equimorph.model import Constraint, Descriptor, Rates, Schedule, names_of
 from equimorph.structures import States, Structure, stability_margin
 
 Values = Float[np.ndarray, " pairs"]
@@ -132,6 +133,84 @@ class Objective:
         """Cost of the way through states in turn."""
         at = np.arange(len(states))
         return float(self.costs(states, at[:-1], at[1:], EXACT).sum())
+
+
+@dataclass(frozen=True)
+class Extreme:
+    """Largest value of a descriptor along a route, kept low, or its least one, kept high.
+
+    Made by `peak` and `least`. `sign` is 1 for the largest and −1 for the least value. Routes may
+    exceed the best value by the share `slack` of it, or of its difference to that of an end.
+    """
+
+    descriptor: Descriptor
+    sign: float
+    slack: float = 1e-3
+
+    def __str__(self) -> str:
+        """Return the words that define it."""
+        return f"{'peak' if self.sign > 0.0 else 'least'} {self.descriptor.name}"
+
+    def along(self, states: States) -> float:
+        """Largest or least value on states."""
+        return float(self.sign * (self.sign * self.descriptor(states)).max())
+
+    def bound(self, value: float, room: float) -> Constraint:
+        """Return the constraint that routes exceed a value by no more than that."""
+        limit = value + self.sign * room
+        return self.descriptor <= limit if self.sign > 0.0 else self.descriptor >= limit
+
+
+@check_arguments
+def peak(descriptor: Descriptor, slack: float = 1e-3) -> Extreme:
+    """Objective of `plan`: the largest value of a descriptor on the way is made as low as possible.
+
+    Of all routes that come as low up to the slack, the shortest one is sought.
+
+    Parameters
+    ----------
+    descriptor
+        What is kept low: an effort, a curvature, a stress.
+    slack
+        Share of the lowest peak by which the route may exceed it; positive.
+
+    Examples
+    --------
+    >>> import equimorph as em
+    >>> print(em.peak(em.Spring().angle))
+    peak angle
+    """
+    return Extreme(descriptor, 1.0, slack)
+
+
+@check_arguments
+def least(descriptor: Descriptor, slack: float = 1e-3) -> Extreme:
+    """Objective of `plan`: the least value of a descriptor on the way is made as high as possible.
+
+    Parameters
+    ----------
+    descriptor
+        What is kept high: a margin, a clearance.
+    slack
+        Share of the highest least value by which the route may fall below it; positive.
+
+    Raises
+    ------
+    InputError
+        If the descriptor is the largest of several functions, like an absolute value.
+
+    Examples
+    --------
+    >>> import equimorph as em
+    >>> print(em.least(em.margin_of(em.Spring())))
+    least stability_margin
+    """
+    if descriptor.branches is not None:
+        raise InputError(
+            "`descriptor` must not be the largest of several functions where it is kept high; got "
+            f"{descriptor.name}. Keep one of these high."
+        )
+    return Extreme(descriptor, -1.0, slack)
 
 
 Wish = Annotated[Term | Sequence[tuple[float, Term]] | Objective, ANYTHING]

@@ -4,7 +4,6 @@ See docs/decisions.md, "Routes are judged by lifts".
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -14,18 +13,15 @@ from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Constraint, Descriptor
 from equimorph.structures import State
-from equimorph.tasks.planning.network import Demands, Ends, cheapest_path, explain_no_route
-from equimorph.tasks.planning.objectives import Wish
-from equimorph.tasks.planning.snap_routes import route_with_snaps
-from equimorph.tasks.planning.straightening import (
-    check_ends,
-    follow_direction,
-    order_ends,
-    route_over_corners,
-    straight_corners,
-    verify_way_points,
-    violation,
+from equimorph.tasks.planning.free_routes import (
+    free_route,
+    route_with_lowest_peak,
+    with_extreme,
 )
+from equimorph.tasks.planning.network import Demands, explain_no_route
+from equimorph.tasks.planning.objectives import Extreme, Wish
+from equimorph.tasks.planning.snap_routes import route_with_snaps
+from equimorph.tasks.planning.straightening import check_ends, verify_way_points, violation
 from equimorph.tasks.route import Corners, Route, refusal
 from equimorph.tasks.start import Start, start_state
 
@@ -39,7 +35,7 @@ def plan(  # noqa: PLR0913  # the knobs of the public face, most by keyword
     via: Sequence[Mapping[str, float]] | None = None,
     within: Sequence[Constraint] = (),
     margin: float = 0.0,
-    objective: Wish = "length",
+    objective: Wish | Extreme = "length",
     snap_price: float | None = None,
     monitor: Sequence[Descriptor] = (),
 ) -> Route:
@@ -70,7 +66,9 @@ def plan(  # noqa: PLR0913  # the knobs of the public face, most by keyword
         actuators that recover no energy), "clearance" (``∫ ds/margin``), a descriptor d like the
         energy barrier (``∫ ds/d``), `Rates` (time; the schedule then has times), or a sum
         ``[(1, "length"), (0.2, "work")]``; see `Objective`. The result is a local minimum near the
-        best path over the mesh; from goal to start it is the same, backwards.
+        best path over the mesh; from goal to start it is the same, backwards. With `peak` or
+        `least` the largest or least value of a descriptor on the way counts first, then the length:
+        `route.bottleneck` has the exact value and where the route cannot avoid it.
     snap_price
         Cost of a snap-through in units of the objective; None forbids them. With a price the route
         may leave its stable stratum over a fold and continue where the snap lands: `route.snaps`
@@ -90,56 +88,39 @@ def plan(  # noqa: PLR0913  # the knobs of the public face, most by keyword
         box, or `margin` is negative.
     """
     start = start_state(start)
-    demands = Demands.of(eset.structure, objective, (*eset.constraints, *within), margin)
+    extreme = objective if isinstance(objective, Extreme) else None
+    wish: Wish = "length" if isinstance(objective, Extreme) else objective
+    demands = Demands.of(eset.structure, wish, (*eset.constraints, *within), margin)
     ends = (start, goal)
     check_ends(eset, ends)
     corners = None if via is None else _checked_corners(eset, start, goal, via)
-    _check_price(snap_price, via)
+    _check_price(snap_price, via, extreme)
     why = violation(ends, demands)
     if why:
         return refusal(why, corners)
     if corners is not None:
-        return verify_way_points(ends, corners, demands, monitor)
-    free = _free(eset, ends, demands, monitor)
+        return with_extreme(verify_way_points(ends, corners, demands, monitor), extreme)
+    if extreme is not None:
+        return route_with_lowest_peak(eset, ends, extreme, demands, monitor)
+    free = free_route(eset, ends, demands, monitor)
     if snap_price is None:
-        return free
+        return free or refusal(explain_no_route(eset, ends, demands))
     snapping = route_with_snaps(eset, ends, demands, snap_price, monitor)
-    arrived = [route for route in (free, snapping) if route.arrived]
+    arrived = [route for route in (free, snapping) if route is not None and route.arrived]
     return min(arrived, key=lambda route: route.cost, default=snapping)
 
 
-def _check_price(snap_price: float | None, via: Sequence[Mapping[str, float]] | None) -> None:
+def _check_price(
+    snap_price: float | None,
+    via: Sequence[Mapping[str, float]] | None,
+    extreme: Extreme | None,
+) -> None:
     if snap_price is not None and via is not None:
         raise InputError("`via` must not be given with `snap_price`; got both.")
-
-
-def _free(
-    eset: EquilibriumSet, ends: Ends, demands: Demands, monitor: Sequence[Descriptor]
-) -> Route:
-    """Return the cheapest route found, searched with a growing reserve of margin.
-
-    What leaves no room for a reserve is searched without one before it is refused.
-    """
-    route = _with_reserves(eset, ends, demands, monitor)
-    if route is not None and not route.arrived and demands.constraints:
-        # coarse lifts step over corners of what is forbidden
-        route = _with_reserves(eset, ends, replace(demands, closely=True), monitor) or route
-    return route or refusal(explain_no_route(eset, ends, demands))
-
-
-def _with_reserves(
-    eset: EquilibriumSet, ends: Ends, demands: Demands, monitor: Sequence[Descriptor]
-) -> Route | None:
-    """Route, the last one that was refused, or None where no path leads to the goal."""
-    route = None
-    for tightened in demands.with_reserves(min(end.margin for end in ends)):
-        path = cheapest_path(eset, order_ends(ends), tightened)
-        if path is not None:
-            corners = follow_direction(straight_corners(eset, path, tightened), ends)
-            route = route_over_corners(eset, corners, demands, monitor)
-            if route.arrived:
-                return route
-    return route
+    if snap_price is not None and extreme is not None:
+        raise InputError(
+            f"`snap_price` must not be given with the objective {extreme}; got {snap_price!r}."
+        )
 
 
 def _checked_corners(

@@ -16,7 +16,7 @@ from equimorph.manifold.geometry.topology import faces_of
 from equimorph.manifold.queries.nearest import SetPoints
 from equimorph.model import Descriptor
 from equimorph.tasks.optimising.tangent_steps import unconstrained_setting
-from equimorph.tasks.stable_part import from_cache, vertex_values
+from equimorph.tasks.stable_part import from_cache
 
 CLOSE = 0.5
 """Distance of two predictions, in sizes of their cell, below which one of them will do."""
@@ -54,7 +54,8 @@ class Predictor:
     @cached_property
     def values(self) -> Float[np.ndarray, "V k"]:
         """Values at the vertices."""
-        return np.stack([vertex_values(self.eset, each) for each in self.descriptors], axis=1)
+        points = self.eset.points
+        return np.stack([each.function(points.z, points.p) for each in self.descriptors], axis=1)
 
     @cached_property
     def spread(self) -> Float[np.ndarray, " k"]:

@@ -1,0 +1,138 @@
+"""Routes without a snap: searched on the network, straightened, verified; with a peak kept low."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from equimorph.arrays import Lanes, Parameters, Values
+from equimorph.manifold import EquilibriumSet
+from equimorph.model import Constraint, Descriptor, eased
+from equimorph.structures import States, join_states, stability_margin
+from equimorph.tasks.optimising.programme import Objective
+from equimorph.tasks.planning.bottlenecks import Passing, find_bottleneck
+from equimorph.tasks.planning.filtration import Filtration
+from equimorph.tasks.planning.network import Demands, Ends, cheapest_path, explain_no_route
+from equimorph.tasks.planning.objectives import ROUGH, Extreme
+from equimorph.tasks.planning.straightening import (
+    follow_direction,
+    order_ends,
+    route_over_corners,
+    straight_corners,
+)
+from equimorph.tasks.route import Route, describe_place, refusal
+from equimorph.tasks.stable_part import cell_near
+
+KEPT = (0.9, 0.5)
+"""Shares of the largest possible margin that a route with a low peak tries to keep."""
+
+
+def free_route(
+    eset: EquilibriumSet,
+    ends: Ends,
+    demands: Demands,
+    monitor: Sequence[Descriptor],
+    passing: Passing | None = None,
+) -> Route | None:
+    """Return the cheapest route that was found, else the last one refused; None if no path exists.
+
+    With `passing` it leads over that pass, if there is such a path. It is searched with a growing
+    reserve of margin; what leaves no room for a reserve is searched without one before it is
+    refused.
+    """
+    route = _with_reserves(eset, ends, demands, monitor, passing)
+    if route is not None and not route.arrived and demands.constraints:
+        # coarse lifts step over corners of what is forbidden
+        closely = replace(demands, closely=True)
+        return _with_reserves(eset, ends, closely, monitor, passing) or route
+    return route
+
+
+def _with_reserves(
+    eset: EquilibriumSet,
+    ends: Ends,
+    demands: Demands,
+    monitor: Sequence[Descriptor],
+    passing: Passing | None,
+) -> Route | None:
+    route, least = None, _least_margin(ends, passing)
+    for tightened in demands.with_reserves(least):
+        path = _path(eset, ends, tightened, passing)
+        if path is not None:
+            corners = straight_corners(eset, path, tightened)
+            route = route_over_corners(eset, follow_direction(corners, ends), demands, monitor)
+            if route.arrived:
+                return route
+    return route
+
+
+def _least_margin(ends: Ends, passing: Passing | None) -> float:
+    over = None if passing is None else passing.over
+    margins = [end.margin for end in ends] + ([] if over is None else over.margin.tolist())
+    return float(min(margins))
+
+
+def _path(
+    eset: EquilibriumSet, ends: Ends, demands: Demands, passing: Passing | None
+) -> States | None:
+    """Cheapest path between the ordered ends over the network, and a pass; else the lowest way."""
+    first, last = order_ends(ends)
+    over = None if passing is None else passing.over
+    for way in () if over is None else (over, over[::-1]):
+        parts = (cheapest_path(eset, (first, way[0]), demands), way[1:-1],
+                 cheapest_path(eset, (way[-1], last), demands))  # fmt: skip
+        if parts[0] is not None and parts[2] is not None:
+            return join_states(eset.structure, [each for each in parts if each is not None])
+    path = cheapest_path(eset, (first, last), demands)
+    if path is not None or passing is None:
+        return path
+    return passing.way if order_ends(ends) is ends else passing.way[::-1]
+
+
+def with_extreme(route: Route, extreme: Extreme | None) -> Route:
+    """Return a route with its largest or least value as its cost."""
+    if extreme is None or route.states is None or not route.arrived:
+        return route
+    return replace(route, objective=str(extreme), cost=extreme.along(route.states))
+
+
+def route_with_lowest_peak(
+    eset: EquilibriumSet,
+    ends: Ends,
+    extreme: Extreme,
+    demands: Demands,
+    monitor: Sequence[Descriptor],
+) -> Route:
+    """Return the shortest route found of those with the lowest peak, which keeps a margin.
+
+    A margin counts before the length: along the edge of stability routes are short.
+    """
+    bounds = demands.beyond(eset)
+    found = find_bottleneck(eset, ends, extreme, bounds, demands.margin)
+    if found is None:
+        return refusal(explain_no_route(eset, ends, demands))
+    bottleneck, bound = found.bottleneck, found.bound
+    within = replace(demands, constraints=(*demands.constraints, eased(bound)))
+    largest = min(_least_margin(ends, found), _margin_of_ways(eset, ends, (*bounds, bound)))
+    for share in (*KEPT, 0.0):
+        safe = replace(within, margin=max(within.margin, share * largest))
+        route = free_route(eset, ends, safe, (*monitor, extreme.descriptor), found)
+        if route is not None and route.arrived:
+            return replace(with_extreme(route, extreme), bottleneck=bottleneck)
+    where = describe_place(bottleneck.state, eset.names)
+    best = f"the {extreme} is {bottleneck.value:.8g} at {where} ({bottleneck.kind})"
+    why = f"{best}, but no route was verified within {bound}"
+    return replace(refusal(why), bottleneck=bottleneck)
+
+
+def _margin_of_ways(eset: EquilibriumSet, ends: Ends, bounds: Sequence[Constraint]) -> float:
+    """Largest margin that a way over the mesh can keep; ∞ if the mesh has no way."""
+    structure = eset.structure
+
+    def rough(z: Lanes, p: Parameters) -> Values:
+        return stability_margin(structure, z, p, ROUGH)
+
+    margin = Descriptor("rough margin", "1", rough, "", structure.signature)
+    filtration = Filtration.of(eset, Objective(margin, -1.0), tuple(bounds))
+    way = filtration.way(*(cell_near(eset, end) for end in ends))
+    return np.inf if way is None else -float(filtration.level[way].max(initial=-np.inf))
