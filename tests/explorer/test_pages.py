@@ -126,13 +126,17 @@ def test_what_cannot_be_shown_is_refused_in_one_line(spring_set, tmp_path):
         em.explore(spring_set, path=tmp_path / "page.htm")
     with pytest.raises(em.InputError, match="must be a"):
         em.explore(spring_set, path=tmp_path / "page.html", route="around")
+    empty = em.SnapGraph(spring_set, (), ())
     with pytest.raises(em.InputError):
-        em.explore(spring_set, path=tmp_path / "no" / "page.html")
+        em.explore(spring_set, path=tmp_path / "no" / "page.html", snaps=empty)
     other = em.SnapGraph(replace(spring_set), (), ())
     with pytest.raises(em.InputError, match="must be of `eset`"):
         em.explore(spring_set, path=tmp_path / "p.html", snaps=other)
     rod = em.Rod(load="uniform")
     with pytest.raises(em.InputError, match="must describe the structure Spring"):
         em.explore(
-            spring_set, path=tmp_path / "p.html", descriptors=[rod.descriptor("height(0.5)")]
+            spring_set,
+            path=tmp_path / "p.html",
+            descriptors=[rod.descriptor("height(0.5)")],
+            snaps=empty,
         )
