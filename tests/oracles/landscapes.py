@@ -14,6 +14,8 @@ EDGE, RELAXING = 400, 400
 """Steps along the edge of a basin, and of a string."""
 BISECTIONS = 10
 """Between points of two basins."""
+EQUILIBRIUM = 1e-9
+"""Slope up to which Newton has found a saddle; from far beside it, it may find nothing."""
 CHECKED = 5
 """Steps after which it is seen again which flows have come to a well."""
 
@@ -76,8 +78,9 @@ def follow_edge(
         nearest[better], slowest[better] = a[better], slope[better]
         a = after
     for saddle in polish(energy, nearest):
-        value, vector = np.linalg.eigh(energy(saddle[None])[1][0])
-        if (value < 0).sum() != 1 or not np.isfinite(saddle).all():
+        gradient, hessian = energy(saddle[None])
+        value, vector = np.linalg.eigh(hessian[0])
+        if (value < 0).sum() != 1 or np.abs(gradient).max() > EQUILIBRIUM:
             continue
         beside = saddle + 1e-3 * np.array([[1.0], [-1.0]]) * vector[:, 0]
         yield saddle, *map(int, relax(energy, beside, wells)[1])
