@@ -107,11 +107,15 @@ def answered(folder: Path, text: str, *, dots: bool = True) -> tuple[Outcome, Pa
     return outcome, out
 
 
+def _unanswered(*_: object) -> None:
+    raise AssertionError("the answer must come from the folder")
+
+
 def answered_again(study: Path, out: Path) -> Outcome:
     """Run a study that was run before; whatever is not read from the folder fails."""
     with pytest.MonkeyPatch.context() as patch, unchecked():
         draw_dots(patch)
-        patch.setattr("equimorph.study.question.Question.answer", None)
+        patch.setattr("equimorph.study.question.Question.answer", _unanswered)
         return run_study(study, out)
 
 

@@ -137,7 +137,7 @@ def test_a_reachable_set_has_its_boundary_by_kinds_and_answers_queries(run):
     assert not far.can
     assert "actuator limit" in far.why or "x_l" in far.why
     rows = (run[1] / "from-here-reach.csv").read_text().splitlines()
-    assert rows[0] == "piece,kind,detail,x_l,F,angle,F"
+    assert rows[0] == "piece,kind,detail,x_l (natural length),F (k),angle (rad)"
     assert len(rows) == 1 + sum(len(piece.states) for piece in reach.boundary)
     assert (run[1] / "from-here-reach-parameters.png").exists()
 

@@ -245,7 +245,7 @@ def transition_network(
     --------
     >>> from equimorph import Spring, transition_network
     >>> network = transition_network(Spring(), {"x_l": 0.8, "F": 0.0})
-    >>> network.barrier(network.states[0]).energy  # ½ (1 − 0.8)²
+    >>> round(network.barrier(network.states[0]).energy, 12)  # ½ (1 − 0.8)²
     0.02
     """
     point = parameter_vector(structure.parameters, at)[None]

@@ -1,6 +1,6 @@
 """Rates at which parameters may move, and schedules of actuators."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Protocol, runtime_checkable
@@ -108,6 +108,12 @@ PROGRESS, MARGIN, TIME = "progress", "stability_margin", "time"
 DERIVATIVES = (("velocities", "rate", ""), ("accelerations", "acceleration", "²"))
 """Fields of a schedule, how their columns are called, and the power of the time in their units."""
 
+
+def column_of(descriptor: str, parameters: Sequence[str]) -> str:
+    """Name of a descriptor's column, other than those of the parameters: ``F (descriptor)``."""
+    return f"{descriptor} (descriptor)" if descriptor in parameters else descriptor
+
+
 Instants = float | Float[np.ndarray, "*instants"]
 
 
@@ -202,7 +208,7 @@ class Schedule(Tabular):
         if self.times is not None:
             columns[TIME] = self.times
         columns |= {PROGRESS: self.progress, **self.parameters, MARGIN: self.margins}
-        columns |= self.descriptors
+        columns |= {column_of(name, self.names): each for name, each in self.descriptors.items()}
         for key, word, power in DERIVATIVES:
             rates = getattr(self, key)
             for k, name in enumerate(self.names):

@@ -21,7 +21,7 @@ from equimorph.argument_checks import check_arguments
 from equimorph.array_types import Float
 from equimorph.errors import InputError
 from equimorph.model import Schedule
-from equimorph.model.schedule import DERIVATIVES, MARGIN, PROGRESS, TIME
+from equimorph.model.schedule import DERIVATIVES, MARGIN, PROGRESS, TIME, column_of
 from equimorph.storage.files import read_text, write_csv, write_text
 from equimorph.tables import heading
 
@@ -127,13 +127,19 @@ def _schedule(sidecar: dict[str, Any], columns: dict[str, Column]) -> Schedule:
         values=values,
         progress=columns[PROGRESS],
         margins=columns[MARGIN],
-        descriptors={name: columns[name] for name in sidecar["descriptors"]},
+        descriptors={name: _descriptor(name, names, columns) for name in sidecar["descriptors"]},
         start=sidecar["start"],
         way_points=np.array(sidecar["way_points"], dtype=int),
         times=columns.get(heading(TIME, unit)),
         time_unit=unit,
         **moments,
     )
+
+
+def _descriptor(name: str, parameters: tuple[str, ...], columns: dict[str, Column]) -> Column:
+    """Column of a descriptor; files of 0.1 give it the name of a parameter, too."""
+    head = column_of(name, parameters)
+    return columns[head if head in columns else name]
 
 
 def _paths(path: str | Path) -> tuple[Path | None, Path]:
