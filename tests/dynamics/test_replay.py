@@ -160,6 +160,23 @@ def test_lateness_grows_with_the_rate_to_two_thirds(upright, damping):
 
 
 @pytest.mark.slow
+def test_equilibria_of_a_chain_are_followed_on_their_own_branch():
+    """Number 44 of benchmarks/replays.py; Newton's method alone reached another branch."""
+    rod = em.Rod("uniform", axial=30.0, span=0.9)
+    start, generator = rod.natural_state(Theta=1.0), np.random.default_rng(44)
+    corners = [
+        {"Theta": float(generator.uniform(0.7, 1.2)), "q": float(generator.uniform(0.0, 2.0))}
+        for _ in range(2)
+    ]
+    used = ReplaySettings(links=30, step=0.04)
+    way = em.verify(corners, start).schedule
+    limit = em.speed_limit(way, 0.01, start=start, damping=used.damping)
+    played = replay(limit.schedule, start, settings=used)
+    assert not played.snapped
+    assert np.nanmax(played.dynamics) < 0.01
+
+
+@pytest.mark.slow
 def test_the_fold_holds_below_and_snaps_above_for_all_dampings(upright):
     """TIME: 0.01 below and above the chain's fold; landings within 1e-3 of the gradient flow's."""
     found = em.snap_in_time({"Delta": 1.0}, upright, dampings=(0.01, 0.03, 0.1, 0.3, 1.0))

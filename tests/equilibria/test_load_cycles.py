@@ -46,7 +46,21 @@ def test_a_cycle_ends_where_no_state_stops_the_snap():
     assert "escaped" in repr(cycle)
 
 
+def test_a_cycle_ends_where_a_snap_may_land_at_either_of_two_states():
+    """x = 0 is lost at b = 1 in a subcritical pitchfork; at ±√2 the structure is stable."""
+    even = Polynomial(
+        lambda x, b: x**6 * (1 / 6) - x**4 * 0.5 + x**2 * 0.5 - b * x**2 * 0.5, 1, ("b",)
+    )
+    cycle = em.load_cycle(even.state(0.0), [{"b": 1.5}, {"b": 0.0}])
+    assert cycle.status == "ended"
+    assert cycle.detail == "the snap from a branch point may land at either of two states"
+
+
 def test_other_ways_are_refused():
+    with pytest.raises(InputError, match="must have at least one corner; got none"):
+        em.load_cycle(well(), [])
+    with pytest.raises(InputError, match="`cycles` must be a whole number from 1 to"):
+        em.load_cycle(well(), [{"b": 1.0}, {"b": 0.0}], cycles=0)
     with pytest.raises(InputError, match="must end at the parameters of `state`"):
         em.load_cycle(well(), [{"b": 1.0}])
     top = well().structure.state(0.0)

@@ -33,6 +33,16 @@ def test_each_route_is_the_best_of_all_in_its_own_objective(arch_set, routes):
         assert min(costs.values()) >= 0.999 * costs[name]
 
 
+def test_a_route_for_rates_has_the_times_that_it_takes(routes):
+    """At every instant one of the parameters moves at its own rate."""
+    schedule, limits = routes["time"].schedule, WISHES["time"].limits
+    assert schedule.duration == pytest.approx(routes["time"].cost, rel=1e-9)
+    at = [schedule.names.index(name) for name in limits]
+    rates = np.abs(np.diff(schedule.values[:, at], axis=0)) / np.diff(schedule.times)[:, None]
+    np.testing.assert_allclose((rates / list(limits.values())).max(axis=1), 1.0, rtol=1e-9)
+    assert routes["length"].schedule.times is None
+
+
 @pytest.mark.parametrize("wish", ["length", "work", "clearance"])
 def test_inside_out_under_a_limit_on_curvature(arch_set, ends, wish):
     """The goal itself has max |κ| = 10.55: 11 is kept on the way, 6 excludes the goal."""

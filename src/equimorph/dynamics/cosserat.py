@@ -15,7 +15,8 @@ from equimorph.dynamics.linkage import Linkage, Settings
 from equimorph.dynamics.model import Plant, Points, Row
 from equimorph.dynamics.rods import ChainedRod, stiffness_and_rest
 from equimorph.equilibria import settle
-from equimorph.errors import InputError, MissingError
+from equimorph.errors import InputError
+from equimorph.optional_packages import load_package
 from equimorph.structures import Rod, State, States
 from equimorph.structures.rod.construction import construction
 
@@ -28,25 +29,15 @@ ROTARY = 16.0
 the radius of gyration is then 0.01 of the length."""
 LONGEST_ELEMENT = 0.08
 """Length of an element, relative to the rod's, beyond which its rotation sets the step in time."""
+GRIPPED, BEFORE, BEHIND = [0, -1], [0, -2], [1, -1]
+"""Elements that are gripped, and the nodes before and behind each of them."""
 ENDS = "both ends clamped at prescribed places and angles"
 
 
 def elastica_module() -> Any:
-    """PyElastica, which only this simulator needs.
-
-    Raises
-    ------
-    MissingError
-        If it is not installed, with the line that installs it.
-    """
-    try:
-        import elastica  # noqa: PLC0415  # an extra that only a replay needs
-    except ImportError:
-        raise MissingError(
-            '`simulator` must be installed; got "pyelastica" without PyElastica. Run: pip install '
-            '"equimorph[replay-cosserat]", or choose simulator="mujoco".'
-        ) from None
-    return elastica
+    """PyElastica, which only this simulator needs; see `load_package`."""
+    otherwise = ', or choose simulator="mujoco"'
+    return load_package("elastica", "replay-cosserat", "simulator", otherwise)
 
 
 class CosseratModel(DirectModel):
@@ -141,27 +132,27 @@ class _Grips:
 
     def hold(self, rod: Any, time: float) -> None:
         """Set places and directors of the gripped elements."""
-        share = min(max((time - self.time) / self.duration, 0.0), 1.0)
-        now = self.before + share * (self.after - self.before)
-        tangents = np.column_stack([np.cos(now[:, 2]), np.sin(now[:, 2])])
-        for end, nodes in ((0, (0, 1)), (1, (-2, -1))):
-            for sign, node in zip((-0.5, 0.5), nodes, strict=True):
-                rod.position_collection[:2, node] = (
-                    now[end, :2] + sign * self._length * tangents[end]
-                )
-            at = (0, -1)[end]
-            rod.director_collection[:, :, at] = _directors(now[end : end + 1, 2])[:, :, 0]
+        now = self._now(time)
+        angles = now[:, 2]
+        along = 0.5 * self._length * np.array([np.cos(angles), np.sin(angles)])
+        rod.position_collection[:2, BEFORE] = now[:, :2].T - along
+        rod.position_collection[:2, BEHIND] = now[:, :2].T + along
+        rod.director_collection[:, :, GRIPPED] = _directors(angles)
 
     def lead(self, rod: Any, time: float) -> None:
         """Set the rates of the gripped elements."""
-        share = min(max((time - self.time) / self.duration, 0.0), 1.0)
-        angles = self.before[:, 2] + share * (self.after[:, 2] - self.before[:, 2])
+        angles = self._now(time)[:, 2]
         rates = (self.after - self.before) / self.duration
-        for end, nodes in ((0, (0, 1)), (1, (-2, -1))):
-            turn = rates[end, 2] * np.array([-np.sin(angles[end]), np.cos(angles[end])])
-            for sign, node in zip((-0.5, 0.5), nodes, strict=True):
-                rod.velocity_collection[:2, node] = rates[end, :2] + sign * self._length * turn
-            rod.omega_collection[:, (0, -1)[end]] = (rates[end, 2], 0.0, 0.0)
+        turn = 0.5 * self._length * rates[:, 2] * np.array([-np.sin(angles), np.cos(angles)])
+        rod.velocity_collection[:2, BEFORE] = rates[:, :2].T - turn
+        rod.velocity_collection[:2, BEHIND] = rates[:, :2].T + turn
+        rod.omega_collection[:, GRIPPED] = 0.0
+        rod.omega_collection[0, GRIPPED] = rates[:, 2]
+
+    def _now(self, time: float) -> Float[np.ndarray, "ends 3"]:
+        """Place and angle of both ends."""
+        share = min(max((time - self.time) / self.duration, 0.0), 1.0)
+        return self.before + share * (self.after - self.before)
 
 
 class CosseratPlant(Plant):
@@ -170,9 +161,10 @@ class CosseratPlant(Plant):
     def __init__(self, model: CosseratModel, start: State, step: float, rate: float) -> None:
         self._model, self._step = model, step
         self.p, self._time = start.p.copy(), 0.0
-        self._y = np.append(start.p, 1.0)
-        self._forces = model.chained.linkage.forces[0]
-        self._grips = _Grips(model.chained.linkage, self._y)
+        linkage = model.chained.linkage
+        self._table, self._y = linkage.forces[0], np.append(start.p, 1.0)
+        self._forces = self._table @ self._y
+        self._grips = _Grips(linkage, self._y)
         rod, self._energy_scale = self._made(start), model.chained.energy
         element = min(1.0 / self.elements, LONGEST_ELEMENT)
         fastest = COURANT * element / np.sqrt(rod.shear_matrix[2, 2, 0])
@@ -229,7 +221,7 @@ class CosseratPlant(Plant):
 
             def apply_forces(self, system: Any, time: Any = 0.0) -> None:
                 del time
-                half = 0.5 * (plant._forces @ plant._y).T
+                half = 0.5 * plant._forces.T
                 system.external_forces[:2, :-1] += half
                 system.external_forces[:2, 1:] += half
 
@@ -249,6 +241,7 @@ class CosseratPlant(Plant):
     def set(self, p: Row) -> None:
         """Set the parameters."""
         self.p, self._y = p.copy(), np.append(p, 1.0)
+        self._forces = self._table @ self._y
 
     def step(self) -> None:
         """One step in time, in as many of PyElastica as its fastest waves need.
@@ -290,7 +283,7 @@ class CosseratPlant(Plant):
         strain = rod.compute_bending_energy() + rod.compute_shear_energy()
         kinetic = rod.compute_translational_energy() + rod.compute_rotational_energy()
         centres = self.points / self._model.chained.length
-        work = float(((self._forces @ self._y) * centres).sum())
+        work = float((self._forces * centres).sum())
         return float(strain + kinetic - work) * self._energy_scale
 
     def equilibrium(self) -> Points | None:

@@ -71,7 +71,8 @@ def load_cycle(
     """Move a state around a closed way of its parameters, again and again until that repeats.
 
     Between way-points equilibria are lifted along straight moves. Where stability is lost the
-    structure snaps (`snap_landing`), and the motion goes on from where it lands.
+    structure snaps (`snap_landing`), and the motion goes on from where it lands. It ends where a
+    snap may lead to several states, as from a symmetric branch point.
 
     Parameters
     ----------
@@ -85,11 +86,13 @@ def load_cycle(
     Raises
     ------
     InputError
-        If the state is not stable, or the way is not closed.
+        If the state is not stable, there is no way-point, or the way is not closed.
     """
     check_start(state)
     if state.index != 0:
         raise InputError(f"`state` must be stable; got one of index {state.index}.")
+    if not way_points:
+        raise InputError("`way_points` must have at least one corner; got none.")
     last = {**state.parameters}
     for corner in way_points:
         last |= corner
@@ -104,11 +107,15 @@ def load_cycle(
         if detail:
             return LoadCycle("ended", paths, snaps, number, detail)
         end = paths[-1].end.state
-        gap = metric_length(end.structure, (end.z - here.z)[None, : end.structure.unknowns])[0]
-        if gap <= SAME_SOLUTION:
+        if _same(end, here):
             return LoadCycle("closed", paths, snaps, number)
         here = end
     return LoadCycle("open", paths, snaps, cycles)
+
+
+def _same(one: State, other: State) -> bool:
+    n = one.structure.unknowns
+    return bool(metric_length(one.structure, (one.z - other.z)[None, :n])[0] <= SAME_SOLUTION)
 
 
 def _around(
@@ -125,10 +132,13 @@ def _around(
         if end.kind not in CRITICAL:
             return tuple(paths), tuple(snaps), f"{end.kind} {end.detail}".strip()
         ways = [each for each in snap_landing(end.state) if each.status != "held"]
-        landed = sorted((each for each in ways if each.landed), key=lambda each: each.state.energy)
-        if not landed:
-            told = ", ".join(each.status for each in ways) or "held"
-            return tuple(paths), tuple(snaps), f"the snap from a {end.kind} did not land: {told}"
-        snaps.append(landed[0])
-        here, corners = landed[0].state, corners[int(end.at) :]
+        lost = ", ".join(each.status for each in ways if not each.landed)
+        if lost or not ways:
+            why = f"the snap from a {end.kind} did not land: {lost or 'held'}"
+            return tuple(paths), tuple(snaps), why
+        if not all(_same(each.state, ways[0].state) for each in ways):
+            why = f"the snap from a {end.kind} may land at either of two states"
+            return tuple(paths), tuple(snaps), why
+        snaps.append(ways[0])
+        here, corners = ways[0].state, corners[int(end.at) :]
     return tuple(paths), tuple(snaps), f"more than {MOST_SNAPS} snaps in one cycle"

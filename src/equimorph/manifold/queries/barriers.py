@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
-from equimorph.array_types import Int
+from equimorph.array_types import Bool, Int
 from equimorph.arrays import Flags, ItemValues, Lanes, Numbers, Parameters, Some, Values
 from equimorph.equilibria import EnergyBarrier
 from equimorph.equilibria.snap import CRITICAL
@@ -114,13 +114,13 @@ class SetBarriers:
         cells = len(self.landings.radius)
         return (
             f"SetBarriers over {self.eset.box}: {cells} cells of index one, descents from the "
-            f"corners of {int(self.doubtful.sum())} of them end differently"
+            f"corners of {int(self.changing.sum())} of them end differently"
         )
 
     @cached_property
-    def doubtful(self) -> Int[np.ndarray, " cells"]:
+    def changing(self) -> Bool[np.ndarray, " cells"]:
         """Whether descents from the corners of each cell of index one end differently."""
-        return np.asarray(~np.isfinite(self.landings.radius).all(axis=1), int)
+        return ~np.isfinite(self.landings.radius).all(axis=1)
 
     @check_arguments
     def of(self, states: States) -> Barriers:
