@@ -152,7 +152,8 @@ class _Grips:
     def _now(self, time: float) -> Float[np.ndarray, "ends 3"]:
         """Place and angle of both ends."""
         share = min(max((time - self.time) / self.duration, 0.0), 1.0)
-        return self.before + share * (self.after - self.before)
+        now: Float[np.ndarray, "ends 3"] = self.before + share * (self.after - self.before)
+        return now
 
 
 class CosseratPlant(Plant):
