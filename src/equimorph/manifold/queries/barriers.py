@@ -120,7 +120,7 @@ class SetBarriers:
     @cached_property
     def changing(self) -> Bool[np.ndarray, " cells"]:
         """Whether descents from the corners of each cell of index one end differently."""
-        return np.asarray(np.isinf(self.landings.radius).any(axis=1))
+        return np.asarray(~np.isfinite(self.landings.radius).all(axis=1))
 
     @check_arguments
     def of(self, states: States) -> Barriers:
