@@ -63,7 +63,7 @@ class Change:
 CHANGES: Mapping[str, Change] = {
     "Audit": Change(version=7),
     "LeastSnap": Change(version=2),
-    "Proof": Change(version=2, removed=("status",)),  # it follows from `why` and `bounds`
+    "Proof": Change(version=3, removed=("status",)),  # it follows from `why` and `bounds`
     "Route": Change(version=2),  # older ones have no bottleneck
     "Schedule": Change(version=2),  # older ones have no times
     "Shapes": Change(version=2, renamed={"wanted": "targets"}),

@@ -7,7 +7,7 @@ from equimorph.argument_checks import check_arguments
 from equimorph.errors import InputError
 from equimorph.structures.contract import Growth, Structure, Symmetry
 from equimorph.structures.energy import EnergyStructure, Unknown
-from equimorph.structures.equations import Advance, Direction, Equations, LinearSystem, Majorant
+from equimorph.structures.equations import Advance, Direction, Enclosed, Equations, LinearSystem
 from equimorph.structures.frame import Frame, Member
 from equimorph.structures.margin import stability_margin
 from equimorph.structures.quantities import (
@@ -55,6 +55,7 @@ __all__ = [
     "CrossSection",
     "Curvature",
     "Direction",
+    "Enclosed",
     "End",
     "EnergyStructure",
     "Equations",
@@ -63,7 +64,6 @@ __all__ = [
     "LateralMode",
     "LineLoad",
     "LinearSystem",
-    "Majorant",
     "Member",
     "OwnSection",
     "PointForce",

@@ -10,9 +10,9 @@ import numpy as np
 from equimorph.array_types import Float, Int
 from equimorph.arrays import Lanes, Parameters, Sides, Values
 from equimorph.linalg import Border, BorderedSolution
+from equimorph.linalg.intervals import Interval
 
 Direction = tuple[Lanes, Parameters]
-Majorant = Callable[[Direction, Direction], Lanes]
 
 
 @dataclass(frozen=True)
@@ -53,6 +53,19 @@ class LinearSystem:
     solve: Solver
 
 
+@dataclass(frozen=True)
+class Enclosed:
+    """F and its first derivatives over boxes, enclosed.
+
+    residual: F (lanes, size); matrix: F_z, symmetric (lanes, size, size); columns: F_p (lanes,
+    size, parameters).
+    """
+
+    residual: Interval
+    matrix: Interval
+    columns: Interval
+
+
 class Equations(ABC):
     """F(z; p) = 0 with its derivatives, in batches, lanes first.
 
@@ -88,13 +101,13 @@ class Equations(ABC):
     def second_derivative(self, z: Lanes, p: Parameters, v: Direction, w: Direction) -> Lanes:
         """D²F[v, w], second derivative of F along two directions (dz, dp)."""
 
-    def second_derivative_bound(self, z: Lanes, p: Parameters, reach: Direction) -> Majorant | None:
-        """Bound of D²F over boxes around (z, p) that reach so far in each entry; None if unknown.
+    def enclosure(self, z: Interval, p: Interval) -> Enclosed | None:
+        """F and its first derivatives over boxes of states (lanes, size) and parameters.
 
-        The bound is a function of two directions v, w with entries ≥ 0: entry i is at least
-        |D²F[v', w']ᵢ| for all states in the box and all |v'| ≤ v, |w'| ≤ w, entry by entry.
+        All values in the boxes lie within the bounds, rounding included; None if this structure
+        knows no bounds.
         """
-        del z, p, reach
+        del z, p
         return None
 
     @abstractmethod

@@ -10,6 +10,7 @@ from equimorph.argument_checks import check_arguments
 from equimorph.array_types import Float
 from equimorph.arrays import Flags, Lanes, Parameters, Sides, Values
 from equimorph.linalg import BorderedSolution, no_border, solve_bordered
+from equimorph.linalg.intervals import Interval, cosine, inverse, join, sine, square
 from equimorph.model import (
     Descriptor,
     Drawing,
@@ -20,33 +21,8 @@ from equimorph.model import (
     remember_call,
 )
 from equimorph.structures.contract import Structure, Symmetry
-from equimorph.structures.equations import AnyBorder, Direction, Majorant, Shift
+from equimorph.structures.equations import AnyBorder, Direction, Enclosed, Shift
 from equimorph.structures.states import State, natural_state
-
-Term = tuple[float, dict[str, int]]
-"""Factor and exponents of x, F, k, sec δ and tan δ."""
-
-TERMS: tuple[Term, ...] = (
-    (1.0, {"F": 1, "x": 1, "S": 2}),
-    (-1.0, {"k": 1, "x": 1, "S": 1, "T": 1}),
-    (1.0, {"k": 1, "x": 2, "S": 2, "T": 1}),
-)
-"""∂E/∂δ as a sum of products."""
-
-
-def _slopes(term: Term, names: str = "") -> list[tuple[str, Term]]:
-    """Derivatives of a product by δ (d), x, F and k, with the names joined: S′ = ST, T′ = S²."""
-    factor, powers = term
-    changes = [(n, n, {n: -1}) for n in "xFk"]
-    changes += [("d", "S", {"T": 1}), ("d", "T", {"S": 2, "T": -1})]
-    out = []
-    for by, name, change in changes:
-        count = powers.get(name, 0)
-        if count:
-            keys = {*powers, *change}
-            exponents = {key: powers.get(key, 0) + change.get(key, 0) for key in keys}
-            out.append((names + by, (factor * count, exponents)))
-    return out
 
 
 @check_arguments
@@ -158,27 +134,17 @@ class Spring(Structure):
         balance = force - k * stretch * sine
         return np.asarray(b_vw * x * secant2 + b_v * f_w + b_w * f_v + balance * f_vw)[:, None]
 
-    def second_derivative_bound(self, z: Lanes, p: Parameters, reach: Direction) -> Majorant:
-        """Bound of |D²F| for F = F x S² − k x S T + k x² S² T with S = sec δ, T = tan δ.
-
-        Each of the products is bounded by itself. Scale: as F.
-        """
-        x, force, k = (np.abs(p) + reach[1]).T
-        angle = np.minimum(np.abs(z[:, 0]) + reach[0][:, 0], 0.5 * np.pi)
-        powers = {"x": x, "F": force, "k": k, "S": 1.0 / np.cos(angle), "T": np.tan(angle)}
-
-        def bound(v: Direction, w: Direction) -> Lanes:
-            along = [dict(zip("dxFk", (each[0][:, 0], *each[1].T), strict=True)) for each in (v, w)]
-            twice = [
-                term for one in TERMS for once in _slopes(one) for term in _slopes(once[1], once[0])
-            ]
-            total = np.zeros(len(z))
-            for names, (factor, exponents) in twice:
-                size = np.prod([powers[n] ** e for n, e in exponents.items()], axis=0)
-                total += abs(factor) * size * along[0][names[0]] * along[1][names[1]]
-            return total[:, None]
-
-        return bound
+    def enclosure(self, z: Interval, p: Interval) -> Enclosed:
+        """Bounds over boxes of F = F x S² − k x S T + k x² S² T with S = sec δ, T = tan δ."""
+        x, force, k = p[:, 0], p[:, 1], p[:, 2]
+        cos = cosine(z[:, 0])
+        s, t = inverse(cos), sine(z[:, 0]) / cos
+        s2, t2 = square(s), square(t)
+        pull = x * s * (x * s - 1.0) * t
+        slope = x * s2 * (2.0 * force * t + k * (2.0 * x * t2 + x * s2)) - k * x * s * (t2 + s2)
+        columns = [force * s2 + k * s * t * (2.0 * x * s - 1.0), x * s2, pull]
+        rows = join([each[:, None, None] for each in columns], 2)
+        return Enclosed((force * x * s2 + k * pull)[:, None], slope[:, None, None], rows)
 
     def effort(self, z: Lanes, p: Parameters) -> Parameters:
         """∂E/∂(x_l, F, k)."""

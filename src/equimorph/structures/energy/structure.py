@@ -11,6 +11,7 @@ from equimorph.argument_checks import check_arguments
 from equimorph.array_types import Bool, Float
 from equimorph.arrays import Flags, Lanes, Parameters, Values
 from equimorph.errors import InputError
+from equimorph.linalg.intervals import Interval, join
 from equimorph.linalg.sparse import SparseLayout
 from equimorph.model import Constraint, Descriptor, Drawing, position, remember_call
 from equimorph.structures.contract import Growth
@@ -40,7 +41,7 @@ from equimorph.structures.energy.expressions import POINT
 from equimorph.structures.energy.independence import DEPENDENT, SAMPLES, Independence
 from equimorph.structures.energy.leading_form import grows
 from equimorph.structures.energy.tape import Derivatives, Tape, casadi, tape
-from equimorph.structures.equations import Direction, Majorant
+from equimorph.structures.equations import Direction, Enclosed
 
 INDEPENDENCE = "constraint_independence"
 """Descriptor of structures with constraints; see `Independence`."""
@@ -220,24 +221,17 @@ class EnergyStructure(DiscreteStructure):
         """D²F[v, w]."""
         return self._graphs.second(z, p, *v, *w)
 
-    def second_derivative_bound(self, z: Lanes, p: Parameters, reach: Direction) -> Majorant | None:
-        """Bound of |D²F| over boxes by interval arithmetic; None for unusual functions."""
-        second = self._graphs.second
-        if not can_enclose(second):
+    def enclosure(self, z: Interval, p: Interval) -> Enclosed | None:
+        """Bounds over boxes by interval arithmetic on the tapes; None for unusual functions."""
+        tapes = (self._graphs.residual, self._graphs.matrix, self._graphs.columns)
+        if not all(can_enclose(tape) for tape in tapes):
             return None
-        low = np.concatenate([z - reach[0], p - reach[1]], axis=1)
-        high = np.concatenate([z + reach[0], p + reach[1]], axis=1)
-
-        def bound(v: Direction, w: Direction) -> Lanes:
-            around = np.concatenate([*v, *w], axis=1)
-            least, most = enclosure(
-                second,
-                np.concatenate([low, -around], axis=1),
-                np.concatenate([high, around], axis=1),
-            )
-            return np.asarray(np.maximum(np.abs(least), np.abs(most)))
-
-        return bound
+        residual, entries, columns = (enclosure(tape, join([z, p], 1)) for tape in tapes)
+        lanes, layout = z.shape[0], self.layout
+        bounds = (layout.dense(each) for each in (entries.low, entries.high))
+        shape = (lanes, len(self.parameters), self.size)
+        by_p = (each.reshape(shape).transpose(0, 2, 1) for each in (columns.low, columns.high))
+        return Enclosed(residual, Interval(*bounds), Interval(*by_p))
 
     def effort(self, z: Lanes, p: Parameters) -> Parameters:
         """∂L/∂p."""

@@ -165,6 +165,11 @@ class Derivatives:
         return tape((self._z, self._p, self._dp), self._column)
 
     @cached_property
+    def columns(self) -> Tape:
+        """F_p at (z, p), column by column."""
+        return self.tape(casadi().jacobian(self._force, self._p))
+
+    @cached_property
     def step(self) -> Tape:
         """F, F_p·dp and the entries of F_z at (z, p, dp)."""
         outputs = casadi().vertcat(self._force, self._column, self._entries)

@@ -14,6 +14,7 @@ from equimorph.array_types import Float, Int
 from equimorph.arrays import Flags, Lanes, Parameters, Sides, Values
 from equimorph.errors import InputError, suggestion
 from equimorph.linalg import BorderedSolution
+from equimorph.linalg.intervals import Interval
 from equimorph.model import Descriptor, remember_call
 from equimorph.structures.approach import smooth_arcs
 from equimorph.structures.contract import Symmetry
@@ -21,8 +22,8 @@ from equimorph.structures.equations import (
     Advance,
     AnyBorder,
     Direction,
+    Enclosed,
     LinearSystem,
-    Majorant,
     Shift,
 )
 from equimorph.structures.rod.centreline import Centreline, closest_approach, stations
@@ -159,9 +160,9 @@ class AnyRod(HeavyRod):
         """D²F[v, w]."""
         return self.mechanics.second_derivative(z, p, v, w)
 
-    def second_derivative_bound(self, z: Lanes, p: Parameters, reach: Direction) -> Majorant | None:
-        """Bound of D²F over boxes, where the mechanics know one."""
-        return self.mechanics.second_derivative_bound(z, p, reach)
+    def enclosure(self, z: Interval, p: Interval) -> Enclosed | None:
+        """Bounds over boxes, where the mechanics know them."""
+        return self.mechanics.enclosure(z, p)
 
     def effort(self, z: Lanes, p: Parameters) -> Parameters:
         """∂L/∂p: couples and forces of actuators, displacements of loads."""

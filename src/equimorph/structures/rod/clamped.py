@@ -1,6 +1,5 @@
 """PlanarMechanics of the clamped rod: energy, residual, derivatives and solves in batches."""
 
-from dataclasses import dataclass
 from functools import cached_property, partial
 
 import numpy as np
@@ -8,14 +7,15 @@ import numpy as np
 from equimorph.array_types import Float
 from equimorph.arrays import Lanes, Nodal, Parameters, Sides, Values
 from equimorph.linalg import BorderedSolution, CondensedLayout, multiply, no_border
+from equimorph.linalg.intervals import Interval, cosine, join, product, sine
 from equimorph.linalg.lanes import over_lanes
 from equimorph.structures.contract import Symmetry
 from equimorph.structures.equations import (
     Advance,
     AnyBorder,
     Direction,
+    Enclosed,
     LinearSystem,
-    Majorant,
     Shift,
 )
 from equimorph.structures.rod.clamped_derivative_kernels import (
@@ -35,8 +35,6 @@ from equimorph.structures.rod.units import FOUR_PI_SQUARED
 
 PARAMETERS = 4
 """Number of parameters: Θ, Δ, q, ν."""
-MORE = 1.0 + 1e-12
-"""Covers the round-off of the bounds of second derivatives."""
 
 
 class ClampedMechanics(PlanarMechanics):
@@ -145,12 +143,9 @@ class ClampedMechanics(PlanarMechanics):
         over_lanes(second_lanes, self._matrices[1:], arrays, [out])
         return out
 
-    def second_derivative_bound(self, z: Lanes, p: Parameters, reach: Direction) -> Majorant:
-        """Bound of |D²F| over boxes; see `ClampedBound`."""
-        weights, theta = self.mesh.weights, self.nodal_angles(z, p)
-        across = z[:, -1:] * weights - p[:, 2:3] * self.loads
-        along = z[:, -2:-1] * weights
-        return clamped_bound(theta, across, along, reach, weights, self.loads)
+    def enclosure(self, z: Interval, p: Interval) -> Enclosed:
+        """Bounds over boxes by interval arithmetic; see `_enclose`."""
+        return _enclose(self, z, p)
 
     def effort(self, z: Lanes, p: Parameters) -> Parameters:
         """∂L/∂(Θ, Δ, q, ν): actuator couples, ∫Qy, −λ."""
@@ -239,77 +234,36 @@ class ClampedMechanics(PlanarMechanics):
         return image, p * np.array([1.0, -1.0, 1.0, 1.0])
 
 
-# --- bounds of the second derivatives over boxes of states --------------------------------------
+# --- bounds over boxes of states ----------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class ClampedBound:
-    """``|D²F[v, w]|`` for F = Kθ + a cos θ − b sin θ, ∫cos θ − ν, ∫sin θ; a = μm − qR, b = λm.
+def _enclose(rod: ClampedMechanics, z: Interval, p: Interval) -> Enclosed:
+    """F = Kθ + a cos θ − b sin θ, ∫cos θ − ν, ∫sin θ; with a = μm − qR, b = λm.
 
-    ``D²F = −(a cos θ − b sin θ) η_v η_w − (α_v sin θ + β_v cos θ) η_w − …`` with η, α, β the
-    changes of θ, a, b; the constraints' are ``−Σ m cos θ η_v η_w`` and ``−Σ m sin θ η_v η_w``.
-
-    Parameters
-    ----------
-    weights, loads
-        m and |R| at all nodes.
-    curving, sine, cosine
-        Bounds of |a cos θ − b sin θ|, |sin θ| and |cos θ| over each box, at all nodes.
+    Derivatives are formed at all nodes; those by Θ and Δ are differences and sums of those by the
+    two end angles.
     """
-
-    weights: Float[np.ndarray, " nodes"]
-    loads: Float[np.ndarray, " nodes"]
-    curving: Nodal
-    sine: Nodal
-    cosine: Nodal
-
-    def __call__(self, v: Direction, w: Direction) -> Lanes:
-        """Bound along directions with entries ≥ 0."""
-        (turn_v, up_v, along_v), (turn_w, up_w, along_w) = self._changes(v), self._changes(w)
-        both = turn_v * turn_w
-        rows = self.curving * both
-        rows += (up_v * self.sine + along_v * self.cosine) * turn_w
-        rows += (up_w * self.sine + along_w * self.cosine) * turn_v
-        closing = [(self.weights * each * both).sum(axis=1) for each in (self.cosine, self.sine)]
-        return np.concatenate([rows[:, 1:-1], np.stack(closing, axis=1)], axis=1) * MORE
-
-    def _changes(self, v: Direction) -> tuple[Nodal, Nodal, Nodal]:
-        """|η|, |α| and |β| at all nodes."""
-        dz, dp = v
-        turn = spread_to_ends(dz, dp)
-        up = dz[:, -1:] * self.weights + dp[:, 2:3] * self.loads
-        return turn, up, dz[:, -2:-1] * self.weights
-
-
-def spread_to_ends(reach: Lanes, ends: Parameters) -> Nodal:
-    """Changes of the angles at all nodes; those of the ends are |Θ| + |Δ|."""
-    outer = ends[:, :1] + ends[:, 1:2]
-    return np.concatenate([outer, reach[:, :-2], outer], axis=1)
-
-
-def clamped_bound(
-    theta: Nodal,
-    across: Nodal,
-    along: Nodal,
-    reach: Direction,
-    weights: Float[np.ndarray, " nodes"],
-    loads: Float[np.ndarray, " nodes"],
-) -> ClampedBound:
-    """`ClampedBound` over boxes around angles θ and forces a (across) and b (along).
-
-    `reach` is half the width of each box.
-    """
-    a, b = across, along
-    turn = spread_to_ends(*reach)
-    more_a = reach[0][:, -1:] * weights + reach[1][:, 2:3] * np.abs(loads)
-    more_b = reach[0][:, -2:-1] * weights
-    sine, cosine = np.sin(theta), np.cos(theta)
-    largest = np.hypot(np.abs(a) + more_a, np.abs(b) + more_b)
-    curving = np.abs(a * cosine - b * sine) + more_a + more_b + turn * largest
-    return ClampedBound(
-        weights,
-        np.abs(loads),
-        np.minimum(curving, largest),
-        np.minimum(np.abs(sine) + turn, 1.0),
-        np.minimum(np.abs(cosine) + turn, 1.0),
+    m, stiffness = rod.mesh.weights, rod.layout.assembled
+    theta = join([p[:, 1:2] + p[:, :1], z[:, :-2], p[:, 1:2] - p[:, :1]], 1)
+    sin, cos = sine(theta), cosine(theta)
+    along, across = m * sin, m * cos
+    a, b = z[:, -1:] * m - p[:, 2:3] * rod.loads, z[:, -2:-1] * m
+    bending = product(stiffness, theta[:, :, None])[:, :, 0]
+    forces = bending + a * cos - b * sin
+    closing = [across.sum(1)[:, None] - p[:, 3:4], along.sum(1)[:, None]]
+    diagonal = np.diag(stiffness) - (a * sin + b * cos)
+    (lanes, nodes), unknowns = theta.shape, np.r_[1 : rod.unknowns + 1, -2, -1]
+    full = Interval.zeros(lanes, nodes + 2, nodes + 2)
+    full[:, :nodes, :nodes] = stiffness
+    full[:, range(nodes), range(nodes)] = diagonal
+    for at, row in ((-2, -along), (-1, across)):
+        full[:, at, :nodes] = full[:, :nodes, at] = row
+    others = Interval.zeros(lanes, rod.size, 2)
+    others[:, :-2, 0] = -(rod.loads * cos)[:, 1:-1]
+    others[:, -2, 1] = -1.0
+    first, last = full[:, unknowns, :1], full[:, unknowns, nodes - 1 : nodes]
+    return Enclosed(
+        join([forces[:, 1:-1], *closing], 1),
+        full[:, unknowns][:, :, unknowns],
+        join([first - last, first + last, others], 2),
     )

@@ -9,6 +9,7 @@ import numpy as np
 from equimorph.argument_checks import check_arguments
 from equimorph.argument_notes import TWO_NAMES
 from equimorph.array_types import Float
+from equimorph.linalg.intervals import Interval, inverse, rising, square
 from equimorph.structures.network import Edge
 from equimorph.structures.unit_system import Quantity
 
@@ -92,6 +93,17 @@ class Energies:
             mixed = 0.25 * self.stiffness / l0**2 * (1.0 - 3.0 * g / l0**2)
             return np.asarray(0.25 * self.stiffness / l0**3), np.asarray(mixed)
         return np.asarray(0.25 * self.stiffness / g**1.5), np.asarray(-0.5 * self.stiffness / l0**2)
+
+    def enclosures(self, g: Interval, l0: Interval) -> tuple[Interval, Interval, Interval]:
+        """∂W/∂g, ∂²W/∂g² and ∂²W/∂g∂l₀ over boxes."""
+        k, squared = self.stiffness, square(l0)
+        if self.green:
+            share = g / squared
+            mixed = 0.25 * k * ((1.0 - 3.0 * share) / squared)
+            return 0.25 * k * ((share - 1.0) / l0), 0.25 * k / (l0 * squared), mixed
+        length = rising(np.sqrt, g)
+        slope = 0.5 * k * (inverse(l0) - inverse(length))
+        return slope, 0.25 * k / (g * length), -0.5 * k / squared
 
     def third(self, g: Values, l0: Values) -> tuple[Values, Values, Values]:
         """∂³W/∂g³, ∂³W/∂g²∂l₀ and ∂³W/∂g∂l₀²."""

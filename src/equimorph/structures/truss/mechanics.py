@@ -8,13 +8,14 @@ import numpy as np
 from equimorph.array_types import Float, Int
 from equimorph.arrays import Entries, Flags, Lanes, Parameters, Values
 from equimorph.linalg.dense import multiply
+from equimorph.linalg.intervals import Interval, product, square, symmetric
 from equimorph.linalg.sparse import SparseLayout
 from equimorph.model import Actuator, ActuatorKind, Drawing, Forces, Support, SupportKind
 from equimorph.model.drawing import supports_of_point
 from equimorph.structures.any_network import AnyNetwork
 from equimorph.structures.contract import Growth, Symmetry
 from equimorph.structures.discrete import along_corners, linearise
-from equimorph.structures.equations import Direction
+from equimorph.structures.equations import Direction, Enclosed
 from equimorph.structures.images import edges_of_image, images, is_symmetry, parameter_exchange
 from equimorph.structures.truss.bar import Energies
 from equimorph.structures.truss.kernels import linearise_lanes
@@ -164,6 +165,24 @@ class TrussMechanics(AnyNetwork):
         return self._sum_at_joints(
             2.0 * (twice[..., None] * d + by_v[..., None] * dw + by_w[..., None] * dv)
         )
+
+    def enclosure(self, z: Interval, p: Interval) -> Enclosed:
+        """Bounds over boxes; a bar pulls by f = 2 ∂W/∂g · d, d the vector between its joints."""
+        chords, unknowns = self.network.chords, self.unknowns
+        changes = np.moveaxis(self._differences(np.eye(unknowns)), 0, 2)
+        rows = changes.reshape(-1, unknowns)
+        d = product(rows, z[..., None]).reshape(-1, *chords.shape) + chords
+        rest = self.network.lengths + product(self.rates, p[..., None])[..., 0]
+        slope, second, mixed = self.energies.enclosures(square(d).sum(2), rest)
+        stiff = 2.0 * slope[..., None, None] * np.eye(chords.shape[1])
+        stiff = stiff + 4.0 * second[..., None, None] * (d[..., None] * d[..., None, :])
+        halves = product(changes.transpose(0, 2, 1), stiff)  # bars, unknowns, space
+        matrix = product(rows.T, halves.transpose(0, 1, 3, 2).reshape(-1, *rows.shape))
+        pulls = 2.0 * (slope[..., None] * d).reshape(-1, len(rows), 1)
+        by_rest = 2.0 * (mixed[..., None] * d)[..., None] * self.rates[:, None]
+        forces = product(rows.T, pulls) - product(self.pulls.T, p[..., None])
+        columns = product(rows.T, by_rest.reshape(-1, len(rows), len(self.pulls)))
+        return Enclosed(forces[..., 0], symmetric(matrix), columns - self.pulls.T)
 
     # --- states ---------------------------------------------------------------------------------
 

@@ -1,11 +1,14 @@
 """Newton–Kantorovich bounds on straight segments in parameter space.
 
 On a segment p(t) the chord z̄(t) between two equilibria is compared with Newton's operator
-T(z) = z − A⁻¹F(z; p(t)), A = F_z at the middle. With ‖T(z̄) − z̄‖ ≤ Y and ‖DT‖ ≤ Z₁ + Z₂ r within
-distance r of the chord, ``Y + (Z₁ + Z₂ r) r ≤ r`` proves one equilibrium within r for every t; as
-‖I − A⁻¹F_z‖ < 1 there, F_z stays regular and keeps the inertia of A [DayLessardMischaikow2007]_.
+T(z) = z − A F(z; p(t)), A about the inverse of F_z at the middle. With ‖T(z̄) − z̄‖ ≤ Y on the chord
+and ‖I − A F_z‖ ≤ Z < 1 in a tube around it, one equilibrium lies within r = Y/(1 − Z) of the chord
+for every t, if the tube is wider, and none else in the tube; as no F_z in it is singular, F_z keeps
+its inertia [DayLessardMischaikow2007]_. The same holds for all parameters within radii of p(t).
 All bounds are componentwise, in the maximum norm with weights s, so that they hold in z as it is.
 
+F, F_z and F_p are enclosed over boxes with outward rounding, and so is all that follows from them,
+where the structure has an `enclosure`; else they are sampled, which proves nothing.
 See docs/decisions.md, "Proofs are componentwise".
 """
 
@@ -16,31 +19,22 @@ import numpy as np
 from equimorph.array_types import Float, Int
 from equimorph.arrays import Flags, Lanes, Parameters, Values
 from equimorph.columns import Columns
-from equimorph.structures import Direction, Majorant, States, Structure
+from equimorph.linalg.intervals import MORE, Interval, product
+from equimorph.structures import Enclosed, States, Structure
+from equimorph.tasks.verification.sampled_bounds import sampled_enclosure
 
 Matrices = Float[np.ndarray, "lanes size size"]
 
-DIFFERENCE = 1e-4
-"""Step of the central differences that give F_z independently of the solver."""
 SWEEPS = 5
 """Power iterations towards the best weights."""
 LEAST_WEIGHT = 1e-3
 """Least weight relative to the largest: no unknown may count for nothing."""
 ROOM = 4.0
-"""Half width of the boxes around the chord, in units of the defect."""
-ROUNDING = 1e-13
-"""Relative error assumed for every entry of F, and more than it ever is."""
+"""Half width of the tubes around the chord, in units of the defect."""
+LEAST_REACH = 1e-9
+"""Least half width of a tube."""
 SHARES = (0.95, 0.9, 0.8, 0.6, 0.4, 0.2)
 """Parts of the margin at the ends of a segment that are tried as bounds on it."""
-
-Tensor = Float[np.ndarray, "lanes size entries entries"]
-
-MOST_ENTRIES = 80
-"""Unknowns, multipliers and parameters up to which all second derivatives are formed."""
-CORNERS = 4
-"""Random corners of each box at which second derivatives are sampled."""
-SAFETY = 2.0
-"""Factor on the largest change of a second derivative seen in the box."""
 
 
 @dataclass(frozen=True)
@@ -57,205 +51,155 @@ class Bounds(Columns):
         Distance within which they are the only ones.
     at_ends
         Distance of the equilibria from the given states at both ends.
-    index
-        Negative eigenvalues of the constrained Hessian all along.
     weights
         s: entry by entry, z lies within r s of the chord.
     margin
-        Stability margin that is kept all along, 0 if none was proved.
+        Stability margin that is kept all along, 0 if none was proved. A margin above 0 says that
+        the index is 0 all along.
     """
 
     proved: Flags
     error: Values
     unique: Values
     at_ends: Float[np.ndarray, "lanes 2"]
-    index: Int[np.ndarray, " lanes"]
     weights: Lanes
     margin: Values
 
 
-def segment_bounds(first: States, last: States, target: float = 0.0) -> Bounds:
-    """Bounds on the segments between pairs of equilibria; the `target` margin is tried as well."""
+def segment_bounds(
+    first: States, last: States, target: float = 0.0, radii: Parameters | None = None
+) -> Bounds:
+    """Bounds on the segments between pairs of equilibria; the `target` margin is tried as well.
+
+    With `radii` ≥ 0 they hold for all parameters within these distances of the segments; with the
+    same states first and last, for boxes of parameters.
+    """
     structure = first.structure
-    middle = States(structure, 0.5 * (first.z + last.z), 0.5 * (first.p + last.p))
-    half = 0.5 * np.abs(last.z - first.z), 0.5 * np.abs(last.p - first.p)
-    matrix = _matrix(structure, middle)
-    inverse, index = _inverse(structure, middle, np.zeros(len(first)))
-    near = _majorant(structure, middle, (half[0] + 1e-6, half[1]))
-    weights = _weights(inverse, near, half)
-    defects, bend = _defect(first, last, inverse, matrix, near, half)
-    defect = _norm(defects.max(axis=1) + bend, weights)
-    reach = ROOM * defect + 1e-9
-    bound = _majorant(structure, middle, (half[0] + reach[:, None] * weights, half[1]))
-    still = np.zeros_like(half[1])
-    off = _norm(np.abs(_unity_gap(inverse, matrix)) @ weights[:, :, None], weights)
-    turn = off + _norm(_apply(inverse, bound(half, (weights, still))), weights)
-    grow = _norm(_apply(inverse, bound((weights, still), (weights, still))), weights)
-    room = (1.0 - turn) ** 2 - 4.0 * defect * grow
-    root = np.sqrt(np.maximum(room, 0.0))
-    error = 2.0 * defect / np.maximum(1.0 - turn + root, 1e-300)
-    with np.errstate(divide="ignore"):
-        unique = np.minimum(reach, np.maximum(1.0 - turn, 0.0) / np.maximum(grow, 1e-300))
-    proved = (turn < 1.0) & (room > 0.0) & (error <= reach) & np.isfinite(error)
-    ends = np.stack([_norm(each, weights) for each in np.moveaxis(defects, 1, 0)], axis=1)
-    at_ends = 2.0 * ends / np.maximum(1.0 - turn, 1e-300)[:, None]
-    tube = half[0] + np.where(proved, error, 0.0)[:, None] * weights, half[1]
-    least = np.minimum(first.margin, last.margin)
-    margin = _margins(middle, matrix, bound, tube, least, target)
-    return Bounds(proved, error, unique, at_ends, index, weights, np.where(proved, margin, 0.0))
+    room = np.zeros_like(first.p) if radii is None else radii
+    with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
+        amid = (Interval.at(0.5 * (one + other)) for one, other in _pairs(first, last))
+        inverse = spectral_inverse(enclose(structure, *amid).matrix.middle)[0]
+        chord, way = (Interval.hull(one, other) for one, other in _pairs(first, last))
+        way = way + Interval(-room, room)
+        near = enclose(structure, chord, way)
+        weights = _weights(inverse, near.matrix.radius)
+        steering = apply(product(inverse, near.columns).size, room)
+        ends = [_defect(each, inverse) + steering for each in (first, last)]
+        defect = _norm(np.maximum(*ends) + _sag(first, last, inverse, near), weights)
+        reach = ROOM * defect + LEAST_REACH
+        tube = reach[:, None] * weights
+        matrix = enclose(structure, chord + Interval(-tube, tube), way).matrix
+        left = 1.0 - contraction(inverse, matrix, weights)
+        error = MORE * defect / left
+        proved = (left > 0.0) & (error <= reach) & np.isfinite(error)
+        at_ends = np.stack([MORE * _norm(each, weights) / left for each in ends], axis=1)
+        least = np.where(proved, np.minimum(first.margin, last.margin), 0.0)
+        margin = _margins(structure, matrix, least, target)
+    return Bounds(proved, error, np.where(left > 0.0, reach, 0.0), at_ends, weights, margin)
 
 
-def _majorant(structure: Structure, middle: States, reach: Direction) -> Majorant:
-    own = structure.second_derivative_bound(middle.z, middle.p, reach)
-    return own or sampled_bound(structure, middle.z, middle.p, reach)
+def _pairs(first: States, last: States) -> tuple[tuple[Lanes, Lanes], ...]:
+    return (first.z, last.z), (first.p, last.p)
 
 
-def _matrix(structure: Structure, middle: States) -> Matrices:
-    """F_z by central differences of F."""
-    lanes, size = middle.z.shape
-    steps = DIFFERENCE * np.eye(size)
-    p = np.repeat(middle.p, size, axis=0)
-    ahead, behind = (
-        structure.residual((middle.z[:, None] + sign * steps).reshape(-1, size), p)
-        for sign in (1.0, -1.0)
-    )
-    rows = ((ahead - behind) / (2.0 * DIFFERENCE)).reshape(lanes, size, size)
-    return np.ascontiguousarray(rows.transpose(0, 2, 1))
+def enclose(structure: Structure, z: Interval, p: Interval) -> Enclosed:
+    """F and its derivatives over boxes: enclosed, or sampled where the structure has no bounds."""
+    return structure.enclosure(z, p) or sampled_enclosure(structure, z, p)
 
 
-def _inverse(
-    structure: Structure, middle: States, shift: Values
-) -> tuple[Matrices, Int[np.ndarray, " lanes"]]:
-    """Approximate inverse of F_z − shift·mass, and the index by its inertia."""
-    units = np.tile(np.eye(structure.size), (len(middle), 1, 1))
-    solved = structure.solve(middle.z, middle.p, units, shift=shift)
-    columns = np.ascontiguousarray(solved.x.transpose(0, 2, 1))
-    return columns, np.asarray(solved.negative - structure.constraints)
+def spectral_inverse(matrix: Matrices) -> tuple[Matrices, Matrices]:
+    """About the inverse of symmetric matrices; and eigenvectors over the roots of |eigenvalues|."""
+    values, vectors = np.linalg.eigh(np.nan_to_num(matrix, posinf=0.0, neginf=0.0))
+    scaled = vectors / np.sqrt(np.abs(values))[:, None]
+    return np.asarray((scaled * np.sign(values)[:, None]) @ scaled.transpose(0, 2, 1)), scaled
 
 
-def _unity_gap(inverse: Matrices, matrix: Matrices) -> Matrices:
-    return np.asarray(np.eye(matrix.shape[1]) - inverse @ matrix)
+def contraction(inverse: Matrices, matrix: Interval, weights: Lanes) -> Values:
+    """Bound of ‖I − A M‖ for all matrices M within bounds."""
+    gap = (np.eye(inverse.shape[1]) - product(inverse, matrix)).size
+    return _norm(apply(gap, weights), weights)
 
 
-def _apply(inverse: Matrices, rows: Lanes) -> Lanes:
-    """|A⁻¹| times rows ≥ 0."""
-    return np.asarray((np.abs(inverse) @ rows[:, :, None])[:, :, 0])
+def apply(
+    matrix: Float[np.ndarray, "lanes size any"], rows: Float[np.ndarray, "lanes any"]
+) -> Lanes:
+    """Upper bound of the product of matrices and columns that are not negative."""
+    return np.asarray((matrix @ rows[:, :, None])[:, :, 0] * MORE)
 
 
-def _norm(rows: Float[np.ndarray, "lanes size *one"], weights: Lanes) -> Values:
-    return np.asarray((rows.reshape(weights.shape) / weights).max(axis=1, initial=0.0))
+def _norm(rows: Lanes, weights: Lanes) -> Values:
+    return np.asarray((rows / weights).max(axis=1, initial=0.0) * MORE)
 
 
-def _weights(inverse: Matrices, bound: Majorant, half: Direction) -> Lanes:
-    """Weights in which the change of F_z along the chord counts least: its Perron vector."""
-    weights = np.ones_like(half[0])
-    still = np.zeros_like(half[1])
+def _weights(inverse: Matrices, radius: Matrices) -> Lanes:
+    """Weights in which a change of F_z counts least: the Perron vector of |A| times it."""
+    weights = np.ones(radius.shape[:2])
     for _ in range(SWEEPS):
-        new = _apply(inverse, bound(half, (weights, still)))
+        new = apply(np.abs(inverse), apply(radius, weights))
         size = new.max(axis=1, keepdims=True)
-        weights = np.where(size > 0.0, new / np.maximum(size, 1e-300), 1.0)
+        weights = np.where((size > 0.0) & (size < np.inf), new / size, 1.0)
         weights = np.maximum(weights, LEAST_WEIGHT)
     return np.asarray(weights)
 
 
-def _defect(
-    first: States,
-    last: States,
-    inverse: Matrices,
-    matrix: Matrices,
-    bound: Majorant,
-    half: Direction,
-) -> tuple[Float[np.ndarray, "lanes 2 size"], Lanes]:
-    """|A⁻¹F| at both ends with an allowance for rounding, and its largest increase between."""
-    rows = []
-    for end in (first, last):
-        residual = end.structure.residual(end.z, end.p)
-        rounding = ROUNDING * (np.abs(matrix) @ np.abs(end.z)[:, :, None])[:, :, 0]
-        moved = (inverse @ residual[:, :, None])[:, :, 0]
-        rows.append(np.abs(moved) + _apply(inverse, rounding))
-    # a function with second derivative f″ leaves its chord by max|f″|/8; the whole step is 2 half
-    bend = 0.5 * _apply(inverse, bound(half, half))
-    return np.stack(rows, axis=1), bend
+def _defect(end: States, inverse: Matrices) -> Lanes:
+    """|A F| at given states."""
+    found = enclose(end.structure, Interval.at(end.z), Interval.at(end.p)).residual
+    return product(inverse, found[:, :, None])[:, :, 0].size
 
 
-def _margins(
-    middle: States,
-    matrix: Matrices,
-    bound: Majorant,
-    tube: Direction,
-    least: Values,
-    target: float,
-) -> Values:
+def _sag(first: States, last: States, inverse: Matrices, near: Enclosed) -> Lanes:
+    """Largest departure of A F from its chord between the ends.
+
+    Its slope along the chord stays within ρ of a constant, so that it leaves its own chord by no
+    more than ρ/2.
+    """
+    dz, dp = ((Interval.at(other) - one).size for one, other in _pairs(first, last))
+    change = apply(near.matrix.radius, dz) + apply(near.columns.radius, dp)
+    return 0.5 * MORE * apply(np.abs(inverse), change)
+
+
+def _margins(structure: Structure, matrix: Interval, least: Values, target: float) -> Values:
     """Largest tried σ for which F_z − σ·mass keeps index 0 in the tubes.
 
     Fractions of the smaller margin of the ends are tried; where the demanded margin lies between
     the best fraction and the smaller margin, also the demanded one.
     """
-    kept = np.zeros(len(middle))
+    kept = np.zeros(len(least))
     for share in SHARES:
-        shift = np.where(least > 0.0, share * least, 0.0)
-        good = _keeps(middle, matrix, bound, tube, shift) & (kept == 0.0)
-        kept = np.where(good, shift, kept)
-        if (kept > 0.0).all():
-            break
-    near = (kept < target) & (least > target)
-    if near.any():
-        good = _keeps(middle, matrix, bound, tube, np.where(near, target, 0.0)) & near
-        kept = np.where(good, target, kept)
+        todo = np.flatnonzero((kept == 0.0) & (least > 0.0))
+        shift = share * least[todo]
+        kept[todo] = np.where(keeps_margin(structure, matrix[todo], shift), shift, 0.0)
+    near = np.flatnonzero((kept < target) & (least > target))
+    good = keeps_margin(structure, matrix[near], np.full(len(near), target))
+    kept[near[good]] = target
     return kept
 
 
-def _keeps(
-    middle: States, matrix: Matrices, bound: Majorant, tube: Direction, shift: Values
-) -> Flags:
-    """Whether segments keep more than a margin in their tubes."""
-    structure = middle.structure
-    still, mass = np.zeros_like(tube[1]), np.zeros(structure.size)
-    mass[: structure.unknowns] = structure.mass
-    inverse, index = _inverse(structure, middle, shift)
-    weights = _weights(inverse, bound, tube)
-    moved = matrix - np.eye(structure.size) * mass * shift[:, None, None]
-    off = np.abs(_unity_gap(inverse, moved)) @ weights[:, :, None]
-    change = _apply(inverse, bound(tube, (weights, still)))
-    return np.asarray((_norm(off, weights) + _norm(change, weights) < 1.0) & (index == 0))
+def keeps_margin(structure: Structure, matrix: Interval, margin: Values) -> Flags:
+    """Whether all F_z within bounds have index 0 and more than a margin.
 
-
-def sampled_bound(structure: Structure, z: Lanes, p: Parameters, reach: Direction) -> Majorant:
-    """Bound of D²F from its values at the centres of boxes and at random corners.
-
-    |D²F| at the centre and twice its largest change to a corner: an estimate, not a proof.
+    F_z − σ·mass is regular for all of them, and the inertia of one of them is known.
     """
-    generator = np.random.default_rng(7)
-    centre = _tensor(structure, z, p)
-    change = np.zeros_like(centre)
-    for _ in range(CORNERS):
-        sides = [generator.choice([-1.0, 1.0], each.shape) * each for each in reach]
-        there = _tensor(structure, z + sides[0], p + sides[1])
-        change = np.maximum(change, np.abs(there - centre))
-    table = np.abs(centre) + SAFETY * change
-
-    def bound(v: Direction, w: Direction) -> Lanes:
-        first, second = (np.concatenate(each, axis=1) for each in (v, w))
-        return np.asarray(np.einsum("lijk,lj,lk->li", table, first, second, optimize=True))
-
-    return bound
+    size, mass = structure.size, np.zeros(structure.size)
+    mass[: structure.unknowns] = structure.mass
+    shift = (Interval.at(margin)[:, None] * mass)[:, :, None] * np.eye(size)
+    moved = matrix - shift
+    centre = moved.middle
+    inverse, scaled = spectral_inverse(centre)
+    good = contraction(inverse, moved, _weights(inverse, moved.radius)) < 1.0
+    good[good] = negatives(centre[good], scaled[good]) == structure.constraints
+    return np.asarray(good)
 
 
-def allows_sampling(structure: Structure) -> bool:
-    """Whether the second derivatives are few enough."""
-    return structure.size + len(structure.parameters) <= MOST_ENTRIES
+def negatives(matrix: Matrices, scaled: Matrices) -> Int[np.ndarray, " lanes"]:
+    """Number of negative eigenvalues of symmetric matrices; −1 where it is not certain.
 
-
-def _tensor(structure: Structure, z: Lanes, p: Parameters) -> Tensor:
-    """All second derivatives of F by unknowns, multipliers and parameters."""
-    lanes, size, count = len(z), structure.size, structure.size + len(structure.parameters)
-    first, second = np.triu_indices(count)
-    units = np.eye(count)
-    table = np.empty((lanes, size, count, count))
-    for lane in range(lanes):
-        v, w = ((units[at, :size], units[at, size:]) for at in (first, second))
-        here, there = (np.tile(each[lane], (len(first), 1)) for each in (z, p))
-        values = structure.second_derivative(here, there, v, w).T
-        table[lane][:, first, second] = values
-        table[lane][:, second, first] = values
-    return table
+    By Sylvester's law of inertia it is that of VᵀMV, with V the given eigenvectors, whose
+    Gershgorin discs avoid zero.
+    """
+    turned = product(scaled.transpose(0, 2, 1), product(matrix, Interval.at(scaled)))
+    diagonal = np.einsum("lii->li", turned.low), np.einsum("lii->li", turned.high)
+    discs = turned.size.sum(axis=2) * MORE - turned.size.diagonal(axis1=1, axis2=2)
+    below, above = diagonal[1] < -discs, diagonal[0] > discs
+    return np.where((below | above).all(axis=1), below.sum(axis=1), -1)

@@ -8,14 +8,16 @@ import numpy as np
 
 from equimorph.array_types import Bool, Float, Int
 from equimorph.equilibria import settle
+from equimorph.linalg.intervals import Interval
 from equimorph.structures import States, Structure
-from equimorph.tasks.verification.newton_kantorovich import Bounds, allows_sampling, segment_bounds
+from equimorph.tasks.verification.newton_kantorovich import Bounds, segment_bounds
+from equimorph.tasks.verification.sampled_bounds import allows_sampling
 
 MOST_BISECTIONS = 12
 """Bisections of a segment before it counts as unproved."""
 LARGEST_SAGITTA = 0.25
 """Distance of the exact middle from the chord, relative to its length, that counts as a bend."""
-ENTRIES_AT_ONCE = 400_000
+ENTRIES_AT_ONCE = 100_000
 """Entries of the inverse matrices that are held at a time."""
 
 
@@ -23,13 +25,16 @@ class ProofStatus(StrEnum):
     """Evidence that one stable curve joins the states; each member equals its text."""
 
     PROVED = "proved"
-    """The bounds hold on all segments, and with them those of the second derivatives over whole
-    boxes: the statement is a theorem up to the allowances for round-off."""
+    """The bounds hold on all segments, and all that enters them is enclosed over whole boxes with
+    outward rounding: a theorem on the structure with the numbers that it computes with."""
     SUPPORTED = "supported"
     """The bounds hold on all segments if the second derivatives nowhere exceed twice their largest
-    change seen in samples: evidence, no proof."""
+    change seen in samples and round-off its allowance: evidence, no proof."""
     UNPROVED = "unproved"
     """The bounds fail somewhere, or there are none."""
+
+
+Evidence = Literal["enclosed", "structural", "sampled"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,25 +53,29 @@ class Proof:
     margin
         Stability margin that the curve keeps everywhere, 0 if unproved.
     bounds
-        "structural": of the second derivatives over whole boxes; "sampled": estimated from samples,
-        as for trusses, frames and general rods.
+        "enclosed": over whole boxes with outward rounding; "sampled": estimated from samples, as
+        for frames and general rods; "structural", in older files: with allowances for round-off.
     failed
         First segment for which the bound fails, by its ends.
+    tubes
+        Half widths of the boxes around the chord, for each unknown and multiplier, in which the
+        curve is the only one; None in older files.
     """
 
     why: str
     states: States
     error: Float[np.ndarray, " segments"]
     margin: float
-    bounds: Literal["structural", "sampled"]
+    bounds: Evidence
     failed: States | None = None
+    tubes: Float[np.ndarray, "segments size"] | None = None
 
     @property
     def status(self) -> ProofStatus:
-        """Proved only if the bounds are structural; see `ProofStatus`."""
+        """Proved only if the bounds are enclosed; see `ProofStatus`."""
         if self.why:
             return ProofStatus.UNPROVED
-        return ProofStatus.PROVED if self.bounds == "structural" else ProofStatus.SUPPORTED
+        return ProofStatus.PROVED if self.bounds == "enclosed" else ProofStatus.SUPPORTED
 
     def __repr__(self) -> str:
         """Status, number of segments and the margin, or why there is no proof."""
@@ -82,16 +91,16 @@ def prove(states: States, margin: float = 0.0) -> Proof:
     Newton–Kantorovich bound on every segment; where it fails the segment is bisected. It says,
     for all parameters on the straight segments between those of the states, that an equilibrium
     exists near the chord, that it is the only one there and continuous, and that its index is 0
-    with at least `margin`. This is proved where the structure bounds its second derivatives over
-    whole boxes (spring, clamped rod, formulas), and supported where they are sampled. Assumed:
-    round-off is covered by stated allowances instead of being enclosed by interval arithmetic; F is
-    taken as the structure computes it.
+    with at least `margin`. This is proved where the structure encloses F and its first derivatives
+    over whole boxes (spring, truss, clamped rod, formulas), and supported where they are sampled.
+    A proof counts rounding outward throughout. It is about the discretised structure, with the
+    tables of numbers that it computes with.
     """
     structure = states.structure
     kind = _kind(states)
     if kind == "unknown":
         why = (
-            f"a {structure.kind} with {structure.size} unknowns knows no bound of its second "
+            f"a {structure.kind} with {structure.size} unknowns knows no bounds of its "
             "derivatives and has too many to sample"
         )
         return Proof(why, states, np.zeros(0), 0.0, "sampled")
@@ -114,11 +123,10 @@ def prove(states: States, margin: float = 0.0) -> Proof:
     return Proof(why, states, _errors(bounds), 0.0, kind, states[k : k + 2])
 
 
-def _kind(states: States) -> Literal["structural", "sampled", "unknown"]:
+def _kind(states: States) -> Literal["enclosed", "sampled", "unknown"]:
     structure = states.structure
-    z, p = states.z[:1], states.p[:1]
-    if structure.second_derivative_bound(z, p, (np.zeros_like(z), np.zeros_like(p))) is not None:
-        return "structural"
+    if structure.enclosure(Interval.at(states.z[:1]), Interval.at(states.p[:1])) is not None:
+        return "enclosed"
     return "sampled" if allows_sampling(structure) else "unknown"
 
 
@@ -141,8 +149,8 @@ def _all_bounds(first: States, last: States, margin: float) -> Bounds:
 
 
 def _wrong(bounds: Bounds, margin: float) -> Bool[np.ndarray, " segments"]:
-    """Segments without a bound, of another index, or whose curve need not go on in the next."""
-    wrong = ~bounds.proved | ~_keeps(bounds, margin) | (bounds.index != 0)
+    """Segments without a bound, without margin, or whose curve need not go on in the next."""
+    wrong = ~bounds.proved | ~_keeps(bounds, margin)
     # the equilibrium at a shared end must lie where the next segment has only one
     reach = bounds.at_ends.max(axis=1)[:, None] * bounds.weights
     alone = bounds.unique[:, None] * bounds.weights
@@ -202,15 +210,14 @@ def _errors(bounds: Bounds) -> Float[np.ndarray, " segments"]:
     return np.asarray(bounds.error * bounds.weights.max(axis=1))
 
 
-def _conclude(states: States, bounds: Bounds, kind: Literal["structural", "sampled"]) -> Proof:
-    return Proof("", states, _errors(bounds), float(bounds.margin.min()), kind)
+def _conclude(states: States, bounds: Bounds, kind: Evidence) -> Proof:
+    tubes = bounds.unique[:, None] * bounds.weights
+    return Proof("", states, _errors(bounds), float(bounds.margin.min()), kind, tubes=tubes)
 
 
 def _why(bounds: Bounds, k: int, margin: float) -> str:
     if not bounds.proved[k]:
         return f"the bound fails on a segment after {MOST_BISECTIONS} bisections"
-    if bounds.index[k] != 0:
-        return f"the index is {bounds.index[k]} on a segment"
     if not _keeps(bounds, margin)[k]:
         return f"a margin of {max(margin, 0.0):g} could not be proved on a segment"
     return "neighbouring segments could not be joined"
