@@ -9,7 +9,7 @@ All bounds are componentwise, in the maximum norm with weights s, so that they h
 
 F, F_z and F_p are enclosed over boxes with outward rounding, and so is all that follows from them,
 where the structure has an `enclosure`; else they are sampled, which proves nothing.
-See docs/decisions.md, "Proofs are componentwise".
+See docs/decisions.md, "Proofs are componentwise, and round outward".
 """
 
 from dataclasses import dataclass
