@@ -73,24 +73,22 @@ def _before_ends(curve: Curve, points: Points, outcome: Traces) -> Events:
 
     They show where the index at the end differs from that which the steps imply.
     """
-    size, found = curve.structure.size, list[Events]()
     last = np.flatnonzero(np.append(np.diff(points.lanes) != 0, True))
     last = last[np.isin(outcome.code[points.lanes[last]], REGULAR_ENDS)]
-    lanes = points.lanes[last]
-    p = curve.take(lanes).parameters(points.t[last])
+    p = curve.take(points.lanes[last]).parameters(points.t[last])
     index = curve.structure.index(np.ascontiguousarray(points.z[last]), p)
-    for i in np.flatnonzero(index != points.index[last]):
-        ends, one = np.array([last[i] - 1, last[i]]), curve.take(lanes[i : i + 1])
-        both = curve.take(np.repeat(lanes[i], 2))
-        probe = probe_at(both, fronts(both, points, ends), points.travelled[ends])
-        if np.abs(probe.value[1]) <= AT_EVENT * np.abs(probe.value[0]):
-            continue
-        front = replace(probe.front, index=np.array([points.index[last[i]], index[i]]))
-        probe = replace(probe, front=front)
-        pair = probe.take(np.array([0])), probe.take(np.array([1]))
-        events = locate_all(one, [step_between(pair, None)], (), TraceOptions())
-        found.append(replace(events, lanes=lanes[i : i + 1]))
-    return Events.join(found, size)
+    off = index != points.index[last]
+    last, index = last[off], index[off]
+    lanes = points.lanes[last]
+    here = curve.take(lanes)
+    low, high = (
+        probe_at(here, fronts(here, points, at), points.travelled[at]) for at in (last - 1, last)
+    )
+    low = replace(low, front=replace(low.front, index=points.index[last]))
+    high = replace(high, front=replace(high.front, index=index))
+    regular = ~(np.abs(high.value) <= AT_EVENT * np.abs(low.value))
+    step = step_between(lanes, (low, high)).take(regular)
+    return locate_all(curve, [step], (), TraceOptions())
 
 
 def recorded_points(curve: Curve, z: Lanes, outcome: Traces) -> Points:
@@ -116,9 +114,8 @@ def hidden_events(curve: Curve, points: Points, options: TraceOptions) -> Events
     points
         Their points, from the start on, sorted by lane and length.
     """
-    found = list[Events]()
     if len(points.t) < 2:
-        return Events.join(found, curve.structure.size)
+        return Events.join([], curve.structure.size)
     lanes, index, many = points.lanes, points.index, curve.take(points.lanes)
     probe = probe_at(many, fronts(many, points, np.arange(len(lanes))), points.travelled)
     kept = np.flatnonzero(~_lowest(np.abs(probe.value), lanes, index))
@@ -131,13 +128,10 @@ def hidden_events(curve: Curve, points: Points, options: TraceOptions) -> Events
     close = (least < CLOSE * smaller) & (smaller > AT_EVENT * larger)
     skips = np.diff(kept) > 1
     same = (np.diff(kept) == 1 + skips) & (np.diff(lanes[kept]) == 0)
-    for i in np.flatnonzero((close | skips) & same & (np.diff(index[kept]) == 0)):
-        pair = (few.take(np.array([i])), few.take(np.array([i + 1])))
-        first = float(probe.length[kept[i] + 1]) if skips[i] else None
-        lane = lanes[kept[i] : kept[i] + 1]
-        inside = look_inside(curve.take(lane), pair, first, options)
-        found += [replace(each, lanes=np.full(len(each.code), lane[0])) for each in inside]
-    return Events.join(found, curve.structure.size)
+    at = np.flatnonzero((close | skips) & same & (np.diff(index[kept]) == 0))
+    pairs = few.take(at), few.take(at + 1)
+    first = np.where(skips[at], probe.length[kept[at] + 1], np.nan)
+    return look_inside(curve, lanes[kept[at]], pairs, first, options)
 
 
 def _lowest(value: Values, lanes: Some, index: Some) -> Flags:

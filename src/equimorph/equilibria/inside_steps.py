@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from equimorph.array_types import Bool, Float, Int
-from equimorph.arrays import Lanes
+from equimorph.array_types import Bool, Float
+from equimorph.arrays import Flags, Lanes, Numbers, Some
 from equimorph.columns import Columns
 from equimorph.equilibria.critical import Critical, null_border
 from equimorph.equilibria.curves import Curve, squared_length
@@ -62,22 +62,30 @@ def probe_at(curve: Curve, front: Front, length: Values) -> Probe:
     return Probe(front, -at.g / size, slope / size**2, length)
 
 
-def inside_step(
-    curve: Curve, ends: tuple[Front, Front], lengths: tuple[float, ...], options: TraceOptions
-) -> list[Events]:
-    """Events between two points of one lane that neither the index nor the direction shows.
+@dataclass(frozen=True)
+class Span(Columns):
+    """Steps of lanes that may hide events: their ends, and where these lie on the way.
 
-    `lengths` on the way of the ends, and of a point between them at which F_z is nearly singular,
-    if one is known.
+    first: a place between them at which F_z is nearly singular; NaN where none is known.
     """
-    both = curve.take(np.zeros(2, int))
-    probe = probe_at(both, Front.concatenate(ends), np.array(lengths[:2]))
-    smaller, larger = np.sort(np.abs(probe.value))
+
+    lane: Some
+    before: Front
+    after: Front
+    start: Values
+    stop: Values
+    first: Values
+
+
+def inside_spans(curve: Curve, span: Span, options: TraceOptions) -> Events:
+    """Events between two points of lanes that neither the index nor the direction shows."""
+    here = curve.take(span.lane)
+    low, high = probe_at(here, span.before, span.start), probe_at(here, span.after, span.stop)
+    smaller, larger = np.sort(np.abs([low.value, high.value]), axis=0)
     # a path may start or arrive right at an event: that is no hidden one
-    if smaller <= AT_EVENT * larger:
-        return []
-    pair, first = (probe.take(np.array([0])), probe.take(np.array([1]))), (*lengths[2:], None)[0]
-    return look_inside(curve, pair, first, options)
+    open_ = np.flatnonzero(~(smaller <= AT_EVENT * larger))
+    ends = low.take(open_), high.take(open_)
+    return look_inside(curve, span.lane[open_], ends, span.first[open_], options)
 
 
 def inside_only_steps(curve: Curve, bracket: Bracket, options: TraceOptions) -> list[Events]:
@@ -93,13 +101,10 @@ def inside_only_steps(curve: Curve, bracket: Bracket, options: TraceOptions) -> 
     here, old, new = curve.take(step.lanes), step.before, step.after
     middle = hermite(step, np.full(len(step.lanes), 0.5))
     places = ((old.z, old.t), middle, (new.z, new.t))
-    found = list[Events]()
-    for i in np.flatnonzero(_may_vanish(np.stack([_determinant(here, *at) for at in places]))):
-        one, lengths = step.take(np.array([i])), (0.0, float(step.step[i]))
-        lane = curve.take(one.lanes)
-        inside = inside_step(lane, (one.before, one.after), lengths, options)
-        found += [replace(each, lanes=np.full(len(each.t), one.lanes[0])) for each in inside]
-    return found
+    some = np.flatnonzero(_may_vanish(np.stack([_determinant(here, *at) for at in places])))
+    step, unknown = step.take(some), np.full(len(some), np.nan)
+    span = Span(step.lanes, step.before, step.after, np.zeros(len(some)), step.step, unknown)
+    return [inside_spans(curve, span, options)]
 
 
 def _determinant(curve: Curve, z: Lanes, t: Values) -> Values:
@@ -119,149 +124,185 @@ def _may_vanish(values: Float[np.ndarray, "3 steps"]) -> Bool[np.ndarray, " step
     return np.asarray(dips | low | (middle < EARLY_NEAR * np.minimum(start, end)))
 
 
-def look_inside(
-    curve: Curve, ends: tuple[Probe, Probe], first: float | None, options: TraceOptions
-) -> list[Events]:
-    """What an eigenvalue does between two points where it seems to come close to zero.
+@dataclass(frozen=True)
+class _Piece(Columns):
+    """Parts of steps in which an eigenvalue may reach zero: their ends, and what is known.
 
-    `first` is a length at which it is known to be small.
+    sign, zero: of the eigenvalue at the start of the step, and the size that counts as none; doubt:
+    error of the cubic at the last point.
     """
-    zero = _zero(ends)
-    sign = float(np.sign(ends[0].value[0]))
+
+    lane: Some
+    start: Front
+    begun: Values
+    low: Probe
+    high: Probe
+    first: Values
+    sign: Values
+    zero: Values
+    doubt: Values
+
+    @property
+    def width(self) -> Values:
+        """Length of the parts."""
+        return self.high.length - self.low.length
+
+    def divided(self, middle: Probe, doubt: Values) -> "_Piece":
+        """The side of a point inside on which the eigenvalue falls towards it."""
+        falls = middle.slope < 0.0
+        low, high = middle.where(falls, self.low), self.high.where(falls, middle)
+        return replace(self, low=low, high=high, first=np.full(len(doubt), np.nan), doubt=doubt)
+
+
+def look_inside(
+    curve: Curve, lane: Some, ends: tuple[Probe, Probe], first: Values, options: TraceOptions
+) -> Events:
+    """What eigenvalues do between two points of lanes where they seem to come close to zero.
+
+    `first` is a length at which one is known to be small, or NaN.
+    """
+    sign, zero = np.sign(ends[0].value), _zero(curve.take(lane), ends)
     low, high = (_upright(end, sign, zero) for end in ends)
-    doubt = 0.0
+    front, begun = ends[0].front, ends[0].length
+    piece = _Piece(lane, front, begun, low, high, first, sign, zero, np.zeros(len(lane)))
+    found = list[Events]()
     for _ in range(TRIALS):
-        width = high.length - low.length
-        if width[0] < NARROW:
-            return _at_the_least(curve, (low, high), ends, options)
-        share, least, size = _least(curve, low, high)
-        if first is None and least > max(CLOSE * size, zero, doubt):
-            return []
-        share = share if first is None else float((first - low.length[0]) / width[0])
-        middle, first = _between(curve, ends[0], (low.length, width), share), None
-        if middle is None:
+        narrow = piece.width < NARROW
+        if narrow.any():
+            found.append(_at_the_least(curve, piece.take(narrow), options))
+            piece = piece.take(~narrow)
+        share, least = _least(curve, piece)
+        size = np.minimum(piece.low.value, piece.high.value)
+        safe = least > np.max([CLOSE * size, piece.zero, piece.doubt], axis=0)
+        left = ~(safe & np.isnan(piece.first))
+        piece, share = piece.take(left), share[left]
+        if len(share) == 0:
             break
-        known = np.abs(middle.value[0]) > zero
-        if known and middle.front.index[0] != ends[0].front.index[0]:
-            return _both(curve, (low, middle, high), ends[0].front.index, options)
-        middle = _upright(middle, sign, zero)
-        doubt = _surprise(curve, (low, high), middle)
-        if middle.slope[0] < 0.0:
-            low = middle
-        else:
-            high = middle
-    return [_event(EventCode.BRANCH_POINT, low.front.z, low.front.t, low, found=False)]
+        known = (piece.first - piece.low.length) / piece.width
+        middle, good = _between(curve, piece, np.where(np.isnan(known), share, known))
+        if not good.all():
+            found.append(_events(piece.take(~good), EventCode.BRANCH_POINT, located=False))
+            piece = piece.take(good)
+        parted = (np.abs(middle.value) > piece.zero) & (middle.front.index != piece.start.index)
+        if parted.any():
+            found.append(_both(curve, piece.take(parted), middle.take(parted), options))
+            piece, middle = piece.take(~parted), middle.take(~parted)
+        middle = _upright(middle, piece.sign, piece.zero)
+        piece = piece.divided(middle, _surprise(curve, piece, middle))
+    found.append(_events(piece, EventCode.BRANCH_POINT, located=False))
+    return Events.join(found, curve.metric.size)
 
 
-def _zero(ends: tuple[Probe, Probe]) -> float:
+def _zero(curve: Curve, ends: tuple[Probe, Probe]) -> Values:
     """Size of an eigenvalue that counts as zero between two points."""
     low, high = ends
     bow = np.abs(np.sign(high.value) * high.slope - np.sign(low.value) * low.slope)
     bow = 0.125 * bow * SHARP**2 / (high.length - low.length)
-    return float(np.maximum(TOUCH * np.minimum(np.abs(low.value), np.abs(high.value)), bow)[0])
+    return np.maximum(TOUCH * np.minimum(np.abs(low.value), np.abs(high.value)), bow)
 
 
-def _upright(probe: Probe, sign: float, zero: float) -> Probe:
+def _upright(probe: Probe, sign: Values, zero: Values) -> Probe:
     """The size of the eigenvalue; one that is zero within round-off has the sign of the ends."""
     turned = np.where(np.abs(probe.value) > zero, np.sign(probe.value), sign)
     return replace(probe, value=turned * probe.value, slope=turned * probe.slope)
 
 
-def _surprise(curve: Curve, ends: tuple[Probe, Probe], middle: Probe) -> float:
+def _surprise(curve: Curve, piece: _Piece, middle: Probe) -> Values:
     """Error of the cubic through two points at a point between them."""
-    low, high = ends
-    s, width = (middle.length - low.length) / (high.length - low.length), _chord(curve, low, high)
+    low, high = piece.low, piece.high
+    s, width = (middle.length - low.length) / piece.width, _chord(curve, piece)
     cubic = (1 - s) ** 2 * ((1 + 2 * s) * low.value + s * width * low.slope)
     cubic = cubic + s**2 * ((3 - 2 * s) * high.value - (1 - s) * width * high.slope)
-    return float(np.abs(middle.value - cubic)[0])
+    return np.asarray(np.abs(middle.value - cubic))
 
 
-def _between(curve: Curve, start: Probe, span: tuple[Values, Values], share: float) -> Probe | None:
-    """Point of a step at a share of a span, or elsewhere in it if the curve is singular there."""
-    for place in (min(max(share, 0.1), 0.9), 0.37, 0.71):
-        length = span[0] + place * span[1]
-        front, good = step_along(curve, start.front, length - start.length)
-        if good[0]:
-            return probe_at(curve, front, length)
-    return None
+def _between(curve: Curve, piece: _Piece, share: Values) -> tuple[Probe, Flags]:
+    """Points of steps at shares of parts, or elsewhere in these if the curve is singular there.
+
+    Only of those lanes that have such a point.
+    """
+    length, good = np.zeros(len(share)), np.zeros(len(share), bool)
+    front = piece.start
+    for place in (np.clip(share, 0.1, 0.9), 0.37, 0.71):
+        open_ = np.flatnonzero(~good)
+        here = piece.take(open_)
+        length[open_] = here.low.length + np.broadcast_to(place, share.shape)[open_] * here.width
+        there, good[open_] = step_along(
+            curve.take(here.lane), here.start, length[open_] - here.begun
+        )
+        front = front.with_rows(open_, there)
+        if good.all():
+            break
+    return probe_at(curve.take(piece.lane[good]), front.take(good), length[good]), good
 
 
-def _event(code: int, z: Float[np.ndarray, "1 size"], t: Values, low: Probe, found: bool) -> Events:
-    """One event that leaves the index as it is."""
-    index = np.stack([low.front.index, low.front.index], 1)
-    kind, sure = np.array([code]), np.array([found])
-    return Events(np.zeros(1, int), kind, z, t, low.length, index, sure)
+def _events(
+    piece: _Piece, code: int | Numbers, located: bool, place: tuple[Lanes, Values] | None = None
+) -> Events:
+    """Events that leave the index as it is, at the low ends of pieces or elsewhere in them."""
+    z, t = place or (piece.low.front.z, piece.low.front.t)
+    index = np.stack([piece.low.front.index] * 2, 1)
+    kind, sure = np.full(len(t), code), np.full(len(t), located)
+    return Events(piece.lane, kind, z, t, piece.low.length, index, sure)
 
 
-def _chord(curve: Curve, low: Probe, high: Probe) -> Values:
-    """Distance between two points: for narrow pieces their arclength."""
-    a, b = low.front, high.front
-    lengths = squared_length(curve.structure, curve.weight, b.z - a.z, b.t - a.t)
-    return np.asarray(np.sqrt(lengths))
+def _chord(curve: Curve, piece: _Piece) -> Values:
+    """Distance between the ends of parts: for narrow ones their arclength."""
+    a, b, here = piece.low.front, piece.high.front, curve.take(piece.lane)
+    return np.asarray(np.sqrt(squared_length(here.metric, here.weight, b.z - a.z, b.t - a.t)))
 
 
-def _least(curve: Curve, low: Probe, high: Probe) -> tuple[float, float, float]:
-    """Share and least value of the cubic between two points, and the smaller of their values."""
-    values, slopes = (low.value, high.value), (low.slope, high.slope)
-    share, least = least_inside(values, slopes, _chord(curve, low, high))
-    return float(share[0]), float(least[0]), float(np.minimum(*values)[0])
+def _least(curve: Curve, piece: _Piece) -> tuple[Values, Values]:
+    """Shares and least values of the cubics between the ends of parts."""
+    values, slopes = (piece.low.value, piece.high.value), (piece.low.slope, piece.high.slope)
+    return least_inside(values, slopes, _chord(curve, piece))
 
 
-def _at_the_least(
-    curve: Curve, near: tuple[Probe, Probe], ends: tuple[Probe, Probe], options: TraceOptions
-) -> list[Events]:
-    """Decide on a narrow piece: nothing, one event that touches, or two."""
-    low, high = near
-    share, least, _ = _least(curve, low, high)
-    zero = _zero(ends)
-    if least > zero:
-        return []
-    piece = replace(step_between(near, 0), step=_chord(curve, low, high))
-    z, t = hermite(piece, np.array([share]))
-    length = low.length + share * (high.length - low.length)
-    if least < -zero:
-        front, good = step_along(curve, ends[0].front, length - ends[0].length)
-        if good[0] and front.index[0] != ends[0].front.index[0]:
-            return _both(
-                curve,
-                (low, Probe(front, length, length, length), high),
-                ends[0].front.index,
-                options,
-            )
-    code = EventCode.FOLD if _turns(curve, z, t) else EventCode.BRANCH_POINT
-    return [_event(code, z, t, replace(low, length=length), found=True)]
+def _at_the_least(curve: Curve, piece: _Piece, options: TraceOptions) -> Events:
+    """Decide on narrow parts: nothing, one event that touches, or two."""
+    share, least = _least(curve, piece)
+    low = least <= piece.zero
+    piece, share, least = piece.take(low), share[low], least[low]
+    if len(share) == 0:
+        return Events.join([], curve.metric.size)
+    length = piece.low.length + share * piece.width
+    front, good = step_along(curve.take(piece.lane), piece.start, length - piece.begun)
+    parted = good & (least < -piece.zero) & (front.index != piece.start.index)
+    between = Probe(front, length, length, length)
+    both = _both(curve, piece.take(parted), between.take(parted), options)
+    part = replace(step_between(piece.lane, (piece.low, piece.high)), step=_chord(curve, piece))
+    low = replace(piece.low, length=length)
+    z, t = (each[~parted] for each in hermite(part, share))
+    alone = replace(piece, low=low).take(~parted)
+    turns = _turns(curve.take(alone.lane), z, t)
+    code = np.where(turns, EventCode.FOLD, EventCode.BRANCH_POINT)
+    touching = _events(alone, code, located=True, place=(z, t))
+    return Events.join([both, touching], curve.metric.size)
 
 
-def _turns(curve: Curve, z: Float[np.ndarray, "1 size"], t: Values) -> bool:
-    """Whether vᵀF_t is not zero at a singular point: a fold in which the path does not turn."""
+def _turns(curve: Curve, z: Lanes, t: Values) -> Flags:
+    """Whether vᵀF_t is not zero at singular points: folds in which the path does not turn."""
     p = curve.parameters(t)
     at = Critical(curve.structure, z, p, null_border(curve.structure, z, p))
     column = curve.structure.parameter_derivative(z, p, curve.rate(t))
-    return bool(np.abs(at.along(curve.rate(t)))[0] > 1e-6 * np.linalg.norm(column) > 1e-12)
+    size, along = np.linalg.norm(column, axis=1), np.abs(at.along(curve.rate(t)))
+    return np.asarray((along > 1e-6 * size) & (size > 1e-6))
 
 
-def _both(
-    curve: Curve,
-    points: tuple[Probe, Probe, Probe],
-    index: Int[np.ndarray, " 1"],
-    options: TraceOptions,
-) -> list[Events]:
-    """Locate the events on both sides of a point with another index than that around."""
-    low, middle, high = points
+def _both(curve: Curve, piece: _Piece, middle: Probe, options: TraceOptions) -> Events:
+    """Locate the events on both sides of points with another index than that around."""
     # at a point that is itself singular the index is one of round-off
-    low, high = (replace(each, front=replace(each.front, index=index)) for each in (low, high))
-    brackets = [step_between(pair, None) for pair in ((low, middle), (middle, high))]
-    return [locate_all(curve, brackets, (), replace(options, locate_passed=True))]
+    low, high = (
+        replace(each, front=replace(each.front, index=piece.start.index))
+        for each in (piece.low, piece.high)
+    )
+    brackets = [step_between(piece.lane, pair) for pair in ((low, middle), (middle, high))]
+    return locate_all(curve, brackets, (), replace(options, locate_passed=True))
 
 
-def step_between(pair: tuple[Probe, Probe], what: int | None) -> Bracket:
-    """Step between two points, with the data of its ends."""
+def step_between(lane: Some, pair: tuple[Probe, Probe]) -> Bracket:
+    """Steps of lanes between two points, with the data of their ends."""
     low, high = pair
     flipped = np.sign(low.front.tangent_t) != np.sign(high.front.tangent_t)
-    code = (
-        np.where(flipped, EventCode.FOLD, EventCode.BRANCH_POINT)
-        if what is None
-        else np.array([what])
-    )
-    step = high.length - low.length
-    return Bracket(np.zeros(1, int), low.front, high.front, step, low.length, code)
+    code = np.where(flipped, EventCode.FOLD, EventCode.BRANCH_POINT)
+    return Bracket(lane, low.front, high.front, high.length - low.length, low.length, code)

@@ -13,7 +13,7 @@ from equimorph.equilibria import kernels
 from equimorph.equilibria import step_kernels as stepping
 from equimorph.equilibria.curves import Curve, squared_length
 from equimorph.equilibria.events import Events, events_at
-from equimorph.equilibria.inside_steps import NARROW, inside_step
+from equimorph.equilibria.inside_steps import NARROW, Span, inside_spans
 from equimorph.equilibria.kernels import (
     ARRIVAL,
     BRANCH,
@@ -42,8 +42,6 @@ from equimorph.structures import Advance
 from equimorph.tolerances import METRIC_DIFFERENCE
 
 Names = Numbers
-Span = tuple[tuple[Front, Front], tuple[float, ...]]
-"""Ends of a step and their lengths on the way; see `inside_step`."""
 
 MISS = 0.1
 """Error of the largest value of a cubic inside a step, as a share of its rise above the ends."""
@@ -248,54 +246,46 @@ class Block:
             self.hidden.append(events.take(np.isin(events.lanes, counts[kernels.LANE, at])))
 
     def _look_inside(self, move: Advance) -> None:
-        """Search steps that come close to a singular state, lane by lane: they are rare and short.
+        """Search steps that come close to a singular state.
 
         A step whose start is the singular one is searched together with the step before.
         """
         counts = self._scalars[1]
         stage, what = counts[kernels.STAGE, : self.active], counts[kernels.WHAT, : self.active]
-        for i in np.flatnonzero((stage == CONVERGED) & (what & (HIDDEN | EARLY) != 0)):
-            at, found = np.array([i]), list[Events]()
-            for ends, lengths in self._doubtful(at, move) if self.options.look_inside else ():
-                found += inside_step(self._here.take(at), ends, lengths, self.options)
-            events = self._new(int(counts[kernels.LANE, i]), found)
-            self.hidden += events
-            if not events:
-                what[i] &= ~(HIDDEN | EARLY)
-            elif any((e.code & self.options.stops != 0).any() for e in events):
-                what[i] |= ENDING
+        at = np.flatnonzero((stage == CONVERGED) & (what & (HIDDEN | EARLY) != 0))
+        events = Events.join([], self.curve.metric.size)
+        if self.options.look_inside and len(at):
+            events = inside_spans(self._here, self._spans(at, move), self.options)
+            lanes = counts[kernels.LANE, events.lanes]
+            known = np.array([self._last.get(lane, -np.inf) for lane in lanes.tolist()])
+            fresh = np.abs(events.travelled - known) > NARROW
+            events, lanes = events.take(fresh), lanes[fresh]
+            self._last.update(zip(lanes.tolist(), events.travelled.tolist(), strict=True))
+            self.hidden.append(replace(events, lanes=lanes))
+        what[np.setdiff1d(at, events.lanes)] &= ~(HIDDEN | EARLY)
+        what[events.lanes[events.code & self.options.stops != 0]] |= ENDING
 
-    def _doubtful(self, at: Some, move: Advance) -> list[Span]:
-        """Steps of a lane that may hide events: the one before if it is the first, the present."""
-        numbers, counts = self._scalars
-        what, spans = counts[kernels.WHAT, at[0]], list[Span]()
-        if what & EARLY:
-            ends = self._front(at, back=1), self._front(at)
-            spans.append((ends, (0.0, numbers[kernels.TRAVELLED, at[0]])))
-        if what & HIDDEN:
-            spans.append(self._around(at, move))
-        return spans
-
-    def _new(self, lane: int, found: list[Events]) -> list[Events]:
-        """Events of a lane but for those that were found in the step before, too."""
-        events = Events.join(found, self.curve.metric.size)
-        known = self._last.get(lane, -np.inf)
-        events = events.take(np.abs(events.travelled - known) > NARROW)
-        if len(events.t):
-            self._last[lane] = float(events.travelled[-1])
-        return [replace(events, lanes=np.full(len(events.t), lane))] if len(events.t) else []
+    def _spans(self, at: Some, move: Advance) -> Span:
+        """Steps of lanes that may hide events: the one before if it is the first, the present."""
+        numbers, what = self._scalars[0], self._scalars[1][kernels.WHAT, at]
+        early = at[what & EARLY != 0]
+        none, unknown = np.zeros(len(early)), np.full(len(early), np.nan)
+        ends = self._front(early, back=1), self._front(early)
+        first = Span(early, *ends, none, numbers[kernels.TRAVELLED, early], unknown)
+        return Span.concatenate([first, self._around(at[what & HIDDEN != 0], move)])
 
     def _around(self, at: Some, move: Advance) -> Span:
-        """Ends of a step and their lengths on the way; see `inside_step`."""
-        numbers, counts = (scalars[:, at[0]] for scalars in self._scalars)
-        bracket = self._bracket(at, move)
-        start, stop = numbers[kernels.TRAVELLED], numbers[kernels.TRAVELLED] + bracket.step[0]
-        low = abs(numbers[kernels.DET]) < kernels.NEAR * abs(numbers[kernels.NEW_DET])
-        if not (low and counts[kernels.KNOWN] > 0):
-            return (bracket.before, bracket.after), (start, stop)
+        """The present steps of lanes, together with those before if they start at the least."""
+        numbers, counts = (scalars[:, at] for scalars in self._scalars)
+        bracket, start = self._bracket(at, move), numbers[kernels.TRAVELLED]
+        low = np.abs(numbers[kernels.DET]) < kernels.NEAR * np.abs(numbers[kernels.NEW_DET])
+        low &= counts[kernels.KNOWN] > 0
         turn = numbers[kernels.BEND] * numbers[kernels.ARC]
-        before = start - numbers[kernels.ARC] * np.sinc(turn / np.pi)
-        return (self._front(at, back=1), bracket.after), (before, stop, start)
+        behind = start - numbers[kernels.ARC] * np.sinc(turn / np.pi)
+        before = bracket.before.with_rows(np.flatnonzero(low), self._front(at[low], back=1))
+        first = np.where(low, start, np.nan)
+        begun = np.where(low, behind, start)
+        return Span(at, before, bracket.after, begun, start + bracket.step, first)
 
     def _front(self, at: Some, back: int = 0) -> Front:
         """Where lanes are, or were one step before."""
