@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 
 import equimorph as em
+import sets
 from equimorph.charts.location import Found
+from equimorph.charts.quiet_paths import Unloaded
 from equimorph.charts.rules import first_of_each
 from equimorph.errors import InputError
 from oracles.charted import lifted, spring_fold
@@ -168,6 +170,31 @@ def test_the_reduced_arch_agrees_with_single_paths(arch_set):
             assert np.abs(z - path.end.state.z).max() < 1e-7
     assert len(chart.barriers) > 0
     assert chart.lost <= 2
+
+
+def test_quasi_static_paths_of_the_arch_change_where_they_merge_with_folds_or_meet_the_bound():
+    """Each change has a cause: the unloaded arch has max |κ| = 20, or Newton's cusp is confirmed.
+
+    Arches that exceed the bound before they are loaded have no path. `lift` follows single paths.
+    """
+    eset = sets.arch_set((12, 21))
+    chart, arch = reduced(eset, em.quasi_static("q")), eset.structure
+    cut = chart.eset.points[chart.cut]
+    rest, found = Unloaded.of(eset, "q").natural(cut.p)
+    start = cut.p.copy()
+    start[:, 2] = 0.0
+    with unchecked():
+        bent = arch.max_curvature.function(rest, start)
+    bounded = found & (np.abs(bent - 20.0) < 1e-7)
+    assert bounded.sum() > 10
+    assert (~bounded).sum() > 10
+    for p in cut.p[~bounded][::7]:
+        for theta, delta in p[:2] * (1.0 + np.array([[1e-3, 0.0], [-1e-3, 0.0]])):
+            state = arch.natural_state(Theta=theta, Delta=delta)
+            with unchecked():
+                path = em.lift(state, {"q": 2.5}, within=eset.constraints)
+                inside = chart.state(np.array([[theta, delta]])).inside
+            assert inside[0] == (path.end.kind == "arrived"), (theta, delta, path.end.kind)
 
 
 def test_wrong_reductions_are_refused(spring_set):

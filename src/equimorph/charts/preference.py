@@ -20,7 +20,7 @@ from equimorph.arrays import (
     VertexFlags,
 )
 from equimorph.charts.location import Cells, Found
-from equimorph.charts.rules import Chooser, Scoring
+from equimorph.charts.rules import Changes, Choice
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.complex.cuts import Ends, cut_between
 from equimorph.manifold.complex.edge_points import Places, on_edges
@@ -37,8 +37,14 @@ DIFFERENT = 1e-4
 BESIDE, MOVED = 0.02, 0.3
 """Distance from a fold, in lengths of edges, at which the preference is examined, and the largest
 distance of its state there: at a cusp it is the cube root of the first."""
-PARTS, ROUNDS = 3, 16
-"""Parts and rounds of the division of edges: the change is located to 3⁻¹⁶ = 2e-8 of an edge."""
+PARTS, ROUNDS, LOCATED = 3, 24, 3.0**-16
+"""Parts and rounds of the division of edges, and the share of an edge, 2e-8, to which the change is
+located."""
+GUESSES = 4
+"""Every so many rounds edges are divided on both sides of places that the rule knows."""
+ASIDE, APART = 1e-4, 0.4
+"""Distances from such a place at which it is confirmed: shares of the edge, and of the distance
+from the next place. Closer to a cusp paths tell two folds from one that they touch less well."""
 
 Solved = tuple[Lanes, Parameters, ItemFlags]
 
@@ -48,18 +54,17 @@ class Preference:
     """A rule and the cells among which it chooses."""
 
     cells: Cells
-    choose: Chooser
-    score: Scoring | None = None
+    choice: Choice
 
     def over(self, points: Points) -> Found:
         """Preferred states over points."""
         found = self.cells.find(points)
-        return found.take(self.choose(found, points))
+        return found.take(self.choice.choose(found, points))
 
     def prefers(self, z: Lanes, p: Parameters) -> Flags:
         """Whether states of the set are the preferred ones over their points."""
         both, points = self._with_others(z, p)
-        return self.choose(both, points)[len(both.point) - len(z) :]
+        return self.choice.choose(both, points)[len(both.point) - len(z) :]
 
     def excess(self, z: Lanes, p: Parameters) -> Values:
         """Function that is positive where another state is preferred.
@@ -67,11 +72,11 @@ class Preference:
         The score less that of the best other state, which is smooth where the preference changes;
         −1 where no other state exists. ±1 for rules without a score.
         """
-        if self.score is None:
+        if self.choice.score is None:
             return np.where(self.prefers(z, p), -1.0, 1.0)
         both, _ = self._with_others(z, p)
         others = len(both.point) - len(z)
-        score, best = self.score(both), np.full(len(z), np.inf)
+        score, best = self.choice.score(both), np.full(len(z), np.inf)
         np.minimum.at(best, both.point[:others], score[:others])
         alone = ~np.isfinite(best)
         return np.where(alone, -1.0, score[others:] - np.where(alone, 0.0, best))
@@ -210,28 +215,44 @@ def _locate_changes(
     low, high = np.zeros(len(way.ends)), np.ones(len(way.ends))
     first: ItemFlags = values[:, 0] < 0.0
     todo: Items = np.arange(len(way.ends))
-    shares = np.arange(1, PARTS) / PARTS
-    for _ in range(ROUNDS):
-        if len(todo) == 0:
+    for number in range(ROUNDS):
+        wide = todo[high[todo] - low[todo] > LOCATED]
+        if len(wide) == 0:
             break
-        step = (high - low)[todo]
-        at = low[todo, None] + step[:, None] * shares
-        lanes = np.repeat(todo, len(shares))
+        cuts = low[wide, None] + (high - low)[wide, None] * np.arange(PARTS + 1) / PARTS
+        exact = np.full(len(wide), np.nan)
+        if preference.choice.changes is not None and number % GUESSES == 0:
+            span = cuts[:, [0, -1]]
+            exact = _enclose(cuts, way.changes(preference.choice.changes, wide, span, first[wide]))
+        at, lanes = cuts[:, 1:-1], np.repeat(wide, PARTS - 1)
         z, p, good = way.states(lanes, at.ravel())
         same = np.zeros(len(lanes), bool)
         same[good] = preference.prefers(z[good], p[good]) == first[lanes[good]]
         good, same = good.reshape(at.shape), same.reshape(at.shape)
         passed = np.where(same.all(axis=1), PARTS - 1, same.argmin(axis=1))
-        last = np.minimum(passed, PARTS - 2)
-        known = good[np.arange(len(todo)), last]
-        low[todo] += passed * step / PARTS
-        high[todo] = low[todo] + step / PARTS
-        todo = todo[known]
+        every = np.arange(len(wide))
+        low[wide], high[wide] = cuts[every, passed], cuts[every, passed + 1]
+        sure = (passed == 1) & np.isfinite(exact)
+        low[wide[sure]] = high[wide[sure]] = exact[sure]
+        unknown = ~good[every, np.minimum(passed, PARTS - 2)]
+        todo = np.setdiff1d(todo, wide[unknown])
     done = np.zeros(len(way.ends), bool)
     z, p, good = way.states(todo, 0.5 * (low + high)[todo])
     done[todo[good]] = True
     own = way.ends[done], way.index[done]
     return done, _vertices(way.fabric, *own, z[good], p[good])
+
+
+def _enclose(cuts: Float[np.ndarray, "n cuts"], shares: Float[np.ndarray, "n k"]) -> ItemValues:
+    """Put the inner cuts of edges on both sides of the first known share inside; the shares."""
+    shares = np.column_stack([shares, np.full(len(cuts), np.nan)])
+    shares[~((shares > cuts[:, :1]) & (shares < cuts[:, -1:]))] = np.nan
+    share = shares[np.arange(len(cuts)), np.isfinite(shares).argmax(axis=1)]
+    gap = np.abs(np.column_stack([shares, cuts[:, [0, -1]]]) - share[:, None])
+    room = np.minimum(ASIDE, APART * np.where(gap > LOCATED, gap, np.inf).min(axis=1))
+    known = np.isfinite(share)
+    cuts[known, 1], cuts[known, -2] = (share - room)[known], (share + room)[known]
+    return np.asarray(share)
 
 
 @dataclass(frozen=True)
@@ -250,6 +271,20 @@ class _Straight:
     def _folded(self) -> Bool[np.ndarray, "edges 2"]:
         """Which ends lie on folds."""
         return np.isin(self.fabric.vertices.kinds[self.ends], (VertexKind.FOLD, VertexKind.CORNER))
+
+    def changes(
+        self, changes: Changes, lanes: Items, span: Float[np.ndarray, "n 2"], first: ItemFlags
+    ) -> Float[np.ndarray, "n k"]:
+        """Shares at which a rule's choice changes between two shares of some edges.
+
+        `first`: at which of the two shares the states are preferred.
+        """
+        start, stop = np.where(first, span.T[::-1], span.T)
+        p = self.fabric.vertices.p[self.ends[lanes]]
+        toward = p[:, 1] - p[:, 0]
+        begin = p[:, 0] + start[:, None] * toward
+        found = changes(begin, (stop - start)[:, None] * toward)
+        return np.asarray(start[:, None] + found * (stop - start)[:, None])
 
     def states(self, lanes: Items, t: ItemValues) -> Solved:
         """States at shares t of some edges, their parameters, and whether they were found."""

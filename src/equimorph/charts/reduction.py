@@ -86,7 +86,7 @@ class Reduction(Chart):
     def preference(self) -> Preference:
         """The rule, ready for the set."""
         cells = Cells(self.whole, self.coordinates, self.among)
-        return Preference(cells, self.rule.on(self.whole), self.rule.scores(self.whole))
+        return Preference(cells, self.rule.on(self.whole))
 
     @cached_property
     def cells(self) -> Cells:

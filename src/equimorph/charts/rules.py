@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 
 from equimorph.argument_checks import check_arguments
 from equimorph.array_types import Bool, Float
-from equimorph.arrays import Points
+from equimorph.arrays import Parameters, Points
 from equimorph.charts.location import Found
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
@@ -22,6 +22,20 @@ Scores = Float[np.ndarray, " found"]
 Chooser = Callable[[Found, Points], Bool[np.ndarray, " found"]]
 """Which of the states over points are preferred: at most one over each."""
 Scoring = Callable[[Found], Scores]
+Changes = Callable[[Parameters, Parameters], Float[np.ndarray, "items k"]]
+"""Shares of straight ways, given by their starts and what leads to their ends, at which the choice
+may change, the most likely first; NaN for none. At their starts the state that is asked for is not
+preferred, at their ends it is.
+"""
+
+
+@dataclass(frozen=True, eq=False)
+class Choice:
+    """A rule made ready for a set; score: what is least where a state is preferred, if anything."""
+
+    choose: Chooser
+    score: Scoring | None = None
+    changes: Changes | None = None
 
 
 Identity = Mapping[str, str | int | float]
@@ -34,13 +48,8 @@ class Rule(Rebuilt, ABC):
     """Plain data from which `rule_from` makes the rule again; None for functions and states."""
 
     @abstractmethod
-    def on(self, eset: EquilibriumSet) -> Chooser:
+    def on(self, eset: EquilibriumSet) -> Choice:
         """Return the rule made ready for a set."""
-
-    def scores(self, eset: EquilibriumSet) -> "Scoring | None":
-        """Return the score whose least value is preferred, if the rule has one."""
-        del eset
-        return None
 
 
 @dataclass(frozen=True, repr=False)
@@ -55,11 +64,7 @@ class _Least(Rule):
         """Return what is preferred."""
         return self.name
 
-    def scores(self, eset: EquilibriumSet) -> Scoring:
-        """Return the score."""
-        return self.score(eset)
-
-    def on(self, eset: EquilibriumSet) -> Chooser:
+    def on(self, eset: EquilibriumSet) -> Choice:
         """Prefer the least score."""
         score = self.score(eset)
 
@@ -67,7 +72,7 @@ class _Least(Rule):
             del points
             return first_of_each(found, score(found), eset.structure.elevation)
 
-        return choose
+        return Choice(choose, score)
 
 
 def first_of_each(found: Found, score: Scores, elevation: Descriptor) -> Bool[np.ndarray, " found"]:

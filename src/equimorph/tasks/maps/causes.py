@@ -4,7 +4,7 @@ A cause is a pair of tests that vanish at a state; the first one inside a pair o
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 from functools import partial
@@ -12,23 +12,20 @@ from functools import partial
 import numpy as np
 
 from equimorph.array_types import Bool, Float, Int
-from equimorph.arrays import Edges, Flags, Lanes, Parameters, Settings, Values
+from equimorph.arrays import Edges, Flags, Settings, Values
 from equimorph.columns import Columns
 from equimorph.equilibria.critical import Critical, Test
 from equimorph.equilibria.first_stable import no_critical_states
 from equimorph.equilibria.natural_sheet import NaturalSheet
-from equimorph.equilibria.point_conditions import Vanishing
-from equimorph.equilibria.settle import Guards, Settled, free_directions, settle
+from equimorph.equilibria.settle import free_directions
+from equimorph.equilibria.singular_states import TestsOf, correct_singular_states
 from equimorph.equilibria.trace_options import TraceOptions
 from equimorph.model import Constraint, Descriptor
-from equimorph.structures import Structure
 from equimorph.tasks.maps.brackets import PARTS, SHRINKING, Brackets, Samples, sample_distance
 from equimorph.tolerances import SAME_PLACE
 
 ELSEWHERE = 0.02
 """Arclength between two extrema from which on they are different ones."""
-TestsOf = Callable[[Int[np.ndarray, " some"]], tuple[Test, Test]]
-"""Two tests of some lanes, by their numbers."""
 PairFlags = Bool[np.ndarray, " pairs"]
 BESIDE = 1.0 / PARTS**2
 """Distance from a place at which both sides are examined, as a share of the pair."""
@@ -38,10 +35,6 @@ place needs another cause: near a slightly unfolded pitchfork a cusp and a branc
 the path lie 1e-7 to 1e-5 apart, and only one of them makes the map jump."""
 SLACK = 1e-3
 """How far outside its bracket, in lengths of it, an exact place may lie."""
-NEARBY = Guards(iterations=10, longest=np.inf, too_long=0.5, converged=1e-9)
-"""The guesses are close: longer corrections, in the metric, lead elsewhere."""
-TEST_DIFFERENCE = 1e-6
-"""Step of differences of tests, in the metric: it sets the rate of Newton, not the error."""
 
 
 class Start(IntEnum):
@@ -237,6 +230,7 @@ def _first(
         if not len(at):
             continue
         free = np.stack([axis[at], np.full(len(at), paths.load)], axis=1)
+        free = free_directions(structure, free, len(at))
         tests = partial(_of_some, cause.tests, some)
         exact = correct_singular_states(structure, start.z, start.p, free, tests)
         z, p, good = exact.z, exact.p, exact.found
@@ -249,7 +243,7 @@ def _first(
 
 def _of_some(
     tests: TestsOf, some: Int[np.ndarray, " some"], lanes: Int[np.ndarray, " fewer"]
-) -> tuple[Test, Test]:
+) -> Sequence[Test]:
     """Tests of lanes, given by their numbers in a selection."""
     return tests(some[lanes])
 
@@ -298,31 +292,3 @@ def is_sharp(
     )
     usual = (2.0 * share) ** SHRINKING * before
     return np.asarray(np.isinf(now) | (np.isfinite(before) & (now > usual)))
-
-
-def correct_singular_states(
-    structure: Structure,
-    z: Lanes,
-    p: Parameters,
-    free: Int[np.ndarray, "lanes 2"],
-    tests: TestsOf,
-) -> Settled:
-    """States near guesses at which two tests vanish, in two parameters.
-
-    Newton's method on F = 0 and the tests, in a basis of the kernel of [F_z F_p] that is regular at
-    folds, branch points and cusps.
-
-    Parameters
-    ----------
-    structure
-        The structure.
-    z, p
-        Guesses.
-    free
-        Columns of the two parameters that vary, for each lane.
-    tests
-        Tests that vanish on the lanes with given numbers; see
-        `equimorph.equilibria.critical_tests`.
-    """
-    vanishing = Vanishing(tests, np.arange(len(z)), TEST_DIFFERENCE, one_sided=True, at_null=True)
-    return settle(structure, z, p, free_directions(structure, free, len(z)), [vanishing], NEARBY)
