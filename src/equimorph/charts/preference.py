@@ -220,17 +220,17 @@ def _locate_changes(
         if len(wide) == 0:
             break
         cuts = low[wide, None] + (high - low)[wide, None] * np.arange(PARTS + 1) / PARTS
-        exact = np.full(len(wide), np.nan)
+        exact: ItemValues = np.full(len(wide), np.nan)
         if preference.choice.changes is not None and number % GUESSES == 0:
             span = cuts[:, [0, -1]]
             exact = _enclose(cuts, way.changes(preference.choice.changes, wide, span, first[wide]))
         at, lanes = cuts[:, 1:-1], np.repeat(wide, PARTS - 1)
         z, p, good = way.states(lanes, at.ravel())
-        same = np.zeros(len(lanes), bool)
+        same: Bool[np.ndarray, "..."] = np.zeros(len(lanes), bool)
         same[good] = preference.prefers(z[good], p[good]) == first[lanes[good]]
         good, same = good.reshape(at.shape), same.reshape(at.shape)
         passed = np.where(same.all(axis=1), PARTS - 1, same.argmin(axis=1))
-        every = np.arange(len(wide))
+        every: Items = np.arange(len(wide))
         low[wide], high[wide] = cuts[every, passed], cuts[every, passed + 1]
         sure = (passed == 1) & np.isfinite(exact)
         low[wide[sure]] = high[wide[sure]] = exact[sure]

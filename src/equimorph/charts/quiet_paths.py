@@ -1,6 +1,7 @@
 """Paths in a load from natural states that meet no critical state, and where they change."""
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -118,6 +119,12 @@ class _Cause(Columns):
     p: Parameters
 
 
+def _same(tests: tuple[Test, ...], lanes: Some) -> tuple[Test, ...]:
+    """The same tests of all lanes."""
+    del lanes
+    return tests
+
+
 @dataclass(frozen=True, eq=False)
 class QuietPaths:
     """Paths from natural states to points, each of which ends at its first event."""
@@ -152,10 +159,9 @@ class QuietPaths:
         share = np.full((len(p), len(causes)), np.nan)
         for k, every in enumerate(causes):
             cause = every.take(length[every.lane] > 0.0)
-            lanes, tests = cause.lane, cause.tests
-            free = directions[lanes, : len(tests)] * structure.scales
-            here = structure, cause.z, cause.p, free
-            at = correct_singular_states(*here, lambda _, own=tests: own)
+            lanes, tests = cause.lane, partial(_same, cause.tests)
+            free = directions[lanes, : len(cause.tests)] * structure.scales
+            at = correct_singular_states(structure, cause.z, cause.p, free, tests)
             moved = ((at.p - p[lanes]) / structure.scales * across[lanes]).sum(axis=1)
             share[lanes, k] = np.where(at.found, moved / length[lanes], np.nan)
         return share
@@ -175,6 +181,7 @@ class QuietPaths:
         at[:, load] += ended.t * (p[lanes, load] - at[:, load])
         critical = np.isin(ended.code, (EventCode.FOLD, EventCode.BRANCH_POINT))
         name, met = structure.parameters[load].name, ended.code == EventCode.CONSTRAINT
+        pairs: list[tuple[Flags, tuple[Test, ...]]]
         pairs = [(critical, (gap, test)) for test in (branching(structure, name), quadratic)]
         for constraint, limit in zip(self.eset.constraints, limits, strict=True):
             pairs.append((met, (limit, grazing(structure, constraint, name))))

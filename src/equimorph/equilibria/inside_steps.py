@@ -145,7 +145,7 @@ class _Piece(Columns):
     @property
     def width(self) -> Values:
         """Length of the parts."""
-        return self.high.length - self.low.length
+        return np.asarray(self.high.length - self.low.length)
 
     def divided(self, middle: Probe, doubt: Values) -> "_Piece":
         """The side of a point inside on which the eigenvalue falls towards it."""
@@ -198,7 +198,7 @@ def _zero(curve: Curve, ends: tuple[Probe, Probe]) -> Values:
     low, high = ends
     bow = np.abs(np.sign(high.value) * high.slope - np.sign(low.value) * low.slope)
     bow = 0.125 * bow * SHARP**2 / (high.length - low.length)
-    return np.maximum(TOUCH * np.minimum(np.abs(low.value), np.abs(high.value)), bow)
+    return np.asarray(np.maximum(TOUCH * np.minimum(np.abs(low.value), np.abs(high.value)), bow))
 
 
 def _upright(probe: Probe, sign: Values, zero: Values) -> Probe:
@@ -261,8 +261,8 @@ def _least(curve: Curve, piece: _Piece) -> tuple[Values, Values]:
 def _at_the_least(curve: Curve, piece: _Piece, options: TraceOptions) -> Events:
     """Decide on narrow parts: nothing, one event that touches, or two."""
     share, least = _least(curve, piece)
-    low = least <= piece.zero
-    piece, share, least = piece.take(low), share[low], least[low]
+    down = least <= piece.zero
+    piece, share, least = piece.take(down), share[down], least[down]
     if len(share) == 0:
         return Events.join([], curve.metric.size)
     length = piece.low.length + share * piece.width
