@@ -226,9 +226,9 @@ def _locate_changes(
             exact = _enclose(cuts, way.changes(preference.choice.changes, wide, span, first[wide]))
         at, lanes = cuts[:, 1:-1], np.repeat(wide, PARTS - 1)
         z, p, good = way.states(lanes, at.ravel())
-        same: Bool[np.ndarray, "..."] = np.zeros(len(lanes), bool)
+        same: ItemFlags = np.zeros(len(lanes), bool)
         same[good] = preference.prefers(z[good], p[good]) == first[lanes[good]]
-        good, same = good.reshape(at.shape), same.reshape(at.shape)
+        good, same = good.reshape(at.shape), np.reshape(same, at.shape)
         passed = np.where(same.all(axis=1), PARTS - 1, same.argmin(axis=1))
         every: Items = np.arange(len(wide))
         low[wide], high[wide] = cuts[every, passed], cuts[every, passed + 1]
