@@ -3,6 +3,7 @@
 Of the spring: F = (1 − x_l/cos δ) sin δ, folds at x_l = cos³δ, F = sin³δ (PHYSICS section 2).
 """
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -154,6 +155,8 @@ def test_steps_are_verified_and_proved(run):
     assert found.verified
     assert found.proof.status == "proved"
     assert "<strong>Proved</strong>" in page(run[1])
+    certificate = json.loads((run[1] / "by-hand-verify-certificate.json").read_text())
+    assert certificate["margin"] == found.proof.margin
     schedule = read_schedule(run[1] / "by-hand-verify-schedule.csv")
     np.testing.assert_array_equal(schedule.values[-1], found.states.p[-1])
 

@@ -1,5 +1,6 @@
 """Results and schedules as files that other programs open."""
 
+from equimorph.storage.certificates import write_certificate
 from equimorph.storage.charts import load_chart, save_chart
 from equimorph.storage.journal import open_journal
 from equimorph.storage.maps import write_map
@@ -27,6 +28,7 @@ __all__ = [
     "save_chart",
     "save_set",
     "trajectory_message",
+    "write_certificate",
     "write_map",
     "write_results",
     "write_schedule",

@@ -69,6 +69,10 @@ class Spring(Structure):
         heavy = {} if self._mass == 1.0 else {"mass": self._mass}
         return {"kind": self.kind, "stiffness": self.parameters[2].default, **heavy}
 
+    def plain_energy(self) -> dict[str, Any]:
+        """The kind says it all."""
+        return {"kind": "spring"}
+
     def inertia(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes 1 1"]:
         """m (x_l/cos²δ)²: the mass moves along y = x_l tan δ."""
         delta, x, _, _ = self._split(z, p)

@@ -233,6 +233,11 @@ class EnergyStructure(DiscreteStructure):
         by_p = (each.reshape(shape).transpose(0, 2, 1) for each in (columns.low, columns.high))
         return Enclosed(residual, Interval(*bounds), Interval(*by_p))
 
+    def plain_energy(self) -> dict[str, Any] | None:
+        """Instructions for L = E + λ·c, one after the other; None for unusual functions."""
+        steps = self._graphs.lagrangian.instructions()
+        return None if steps is None else {"kind": "program", "instructions": steps}
+
     def effort(self, z: Lanes, p: Parameters) -> Parameters:
         """∂L/∂p."""
         return self._graphs.effort(z, p)

@@ -18,6 +18,13 @@ ROUGH = frozenset({
     "fabs", "fmin", "fmax", "lt", "le", "if_else_zero", "sign", "not", "and", "or", "eq", "ne",
 })  # fmt: skip
 """Operations that are not twice differentiable."""
+PLAIN = {
+    "assign": 1, "add": 2, "sub": 2, "mul": 2, "div": 2, "neg": 1, "sq": 1, "twice": 1, "inv": 1,
+    "sin": 1, "cos": 1, "sqrt": 1, "exp": 1,
+}  # fmt: skip
+"""Numbers of operands of the operations that programs in certificates may hold."""
+LARGEST_POWER = 20
+"""Largest exponent that they multiply out."""
 _SAME = {"const": "constant", "constpow": "pow"}
 
 
@@ -64,6 +71,43 @@ class Tape:
         if len(x) and self.outputs:
             over_lanes(run_lanes, (self.code, self.constants, self.slots), [x], [result])
         return result
+
+    def instructions(self) -> list[list[Any]] | None:
+        """What leads to the output, in plain words and numbers; None for unusual functions.
+
+        Each instruction has its operation and its operands: the number of an instruction before,
+        of a variable, or a constant.
+        """
+        last: dict[int, int] = {}
+        steps: list[list[Any]] = []
+        for code, first, second, place in self.code.tolist():
+            name = OPERATIONS[code]
+            if name == "output":
+                steps.append(["assign", last[first]])
+                continue
+            operands = [last[each] for each in (first, second) if each in last]
+            if name == "input":
+                step = ["variable", first]
+            elif name == "constant":
+                step = ["constant", float(self.constants[first])]
+            elif name == "pow":
+                *before, step = _power(len(steps), operands[0], steps[operands[-1]])
+                steps += before
+            else:
+                step = [name, *operands[: PLAIN.get(name, 0)]]
+            if len(step) < 2:
+                return None
+            last[place] = len(steps)
+            steps.append(step)
+        return steps
+
+
+def _power(place: int, factor: int, exponent: list[Any]) -> list[list[Any]]:
+    """Instructions from a place on that multiply a whole power out; an empty one for others."""
+    if exponent not in [["constant", float(n)] for n in range(2, LARGEST_POWER + 1)]:
+        return [[]]
+    more = [["mul", place + k, factor] for k in range(int(exponent[1]) - 2)]
+    return [["sq", factor], *more]
 
 
 def tape(inputs: Sequence[Any], outputs: Any) -> Tape:
@@ -139,6 +183,11 @@ class Derivatives:
     def energy(self) -> Tape:
         """E(z, p)."""
         return self.tape(self._energy)
+
+    @cached_property
+    def lagrangian(self) -> Tape:
+        """L(z, p)."""
+        return self.tape(self._lagrangian)
 
     @cached_property
     def residual(self) -> Tape:

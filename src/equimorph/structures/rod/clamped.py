@@ -1,6 +1,7 @@
 """PlanarMechanics of the clamped rod: energy, residual, derivatives and solves in batches."""
 
 from functools import cached_property, partial
+from typing import Any
 
 import numpy as np
 
@@ -146,6 +147,12 @@ class ClampedMechanics(PlanarMechanics):
     def enclosure(self, z: Interval, p: Interval) -> Enclosed:
         """Bounds over boxes by interval arithmetic; see `_enclose`."""
         return _enclose(self, z, p)
+
+    def plain_energy(self) -> dict[str, Any]:
+        """Tables of the energy: K of each element, m and R."""
+        tables = {"stiffness": self.layout.stiffness, "weights": self.mesh.weights}
+        return {"kind": "rod", **{key: each.tolist() for key, each in tables.items()},
+                "loads": self.loads.tolist()}  # fmt: skip
 
     def effort(self, z: Lanes, p: Parameters) -> Parameters:
         """∂L/∂(Θ, Δ, q, ν): actuator couples, ∫Qy, −λ."""

@@ -242,6 +242,11 @@ class Rod(Described):
             )
         return value
 
+    def plain_energy(self) -> dict[str, Any] | None:
+        """Tables of the clamped rod."""
+        made = self.mechanics
+        return made.plain_energy() if isinstance(made, ClampedMechanics) else None
+
     def identity(self) -> dict[str, Any]:
         """Kind, resolution, and everything that differs from the default arch."""
         data: dict[str, Any] = {}

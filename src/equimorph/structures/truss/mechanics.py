@@ -1,7 +1,7 @@
 """Mechanics of a truss in batches of lanes: energy, forces, stiffness, symmetries."""
 
 from functools import cached_property, partial
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -151,6 +151,17 @@ class TrussMechanics(AnyNetwork):
         """∂E/∂p: for an actuator the force that it must bear, for a load minus its travel."""
         by_rest = self.energies.by_rest(*self.lengths(z, p))
         return np.asarray(multiply(by_rest, self.rates) - multiply(z, self.pulls.T))
+
+    def plain_energy(self) -> dict[str, Any]:
+        """Chords and rest lengths of the bars, unknowns at both ends (−1: held), and the rest."""
+        made = self.network
+        tables = {
+            "chords": made.chords, "ends": made.unknowns[made.ends], "lengths": made.lengths,
+            "stiffness": self.energies.stiffness, "rates": self.rates, "pulls": self.pulls,
+        }  # fmt: skip
+        strain = "green" if self.energies.green else "engineering"
+        numbers = {key: each.tolist() for key, each in tables.items()}
+        return {"kind": "truss", "strain": strain, **numbers}
 
     def second_derivative(self, z: Lanes, p: Parameters, v: Direction, w: Direction) -> Lanes:
         """D²F[v, w]: bar forces are 2 ∂W/∂g · d, with d the vector between the joints."""

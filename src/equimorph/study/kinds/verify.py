@@ -2,11 +2,13 @@
 
 from collections.abc import Mapping
 from html import escape
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
 
 from equimorph.manifold import EquilibriumSet
+from equimorph.storage import write_certificate
 from equimorph.study import html
 from equimorph.study.answers import as_route, figures_of_way
 from equimorph.study.question import Figure, Kind, Question
@@ -47,6 +49,15 @@ class VerifyKind(Kind[Verification]):
     def details(self, question: Question, answer: Verification) -> list[str]:
         """What is known between the states."""
         return [_proof(answer.proof)] if answer.verified and answer.proof is not None else []
+
+    def write_files(self, question: Question, answer: Verification, folder: Path) -> None:
+        """Write the schedule, and the certificate of what is proved."""
+        super().write_files(question, answer, folder)
+        proof = answer.proof
+        if proof is None or proof.status is not ProofStatus.PROVED:
+            return
+        if proof.states.structure.plain_energy() is not None:
+            write_certificate(proof, folder / f"{question.files}-certificate.json")
 
     def refusal(self, question: Question, answer: Verification) -> str:
         """Reason why it cannot be executed."""
