@@ -1,4 +1,4 @@
-"""Equilibria of a linkage along a motion of its parameters, and the fold at which they end."""
+"""Equilibria of a mechanism along a motion of its parameters, and the fold at which they end."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -7,7 +7,7 @@ import numpy as np
 from scipy.linalg import eigh, null_space
 
 from equimorph.array_types import Float
-from equimorph.dynamics.linkage import Linkage, Pulls, Settings, Vector
+from equimorph.dynamics.mechanism import Mechanism, Pulls, Settings, Vector
 
 NEWTON_STEPS = 40
 CONVERGED = 1e-10
@@ -34,15 +34,15 @@ Course = Callable[[float], Settings]
 
 @dataclass(frozen=True, eq=False)
 class Balance:
-    """An equilibrium of a linkage: entries, multipliers, settings."""
+    """An equilibrium of a mechanism: entries, multipliers, settings."""
 
-    linkage: Linkage
+    linkage: Mechanism
     v: Vector
     multipliers: Pulls
     y: Settings
 
     @property
-    def places(self) -> Float[np.ndarray, "members joints 2"]:
+    def places(self) -> Float[np.ndarray, "members joints space"]:
         """Places of the joints between links."""
         return self.linkage.places(self.v)
 
@@ -72,7 +72,7 @@ class Balance:
 
 
 def balance(
-    linkage: Linkage, v: Vector, multipliers: Pulls, y: Settings, contraction: float = np.inf
+    linkage: Mechanism, v: Vector, multipliers: Pulls, y: Settings, contraction: float = np.inf
 ) -> Balance | None:
     """Equilibrium near a guess, by Newton's method.
 

@@ -11,7 +11,8 @@ import numpy as np
 from equimorph.array_types import Float
 from equimorph.arrays import Lanes, Parameters
 from equimorph.dynamics.direct import DirectModel
-from equimorph.dynamics.linkage import Linkage, Settings
+from equimorph.dynamics.linkage import Linkage
+from equimorph.dynamics.mechanism import Settings
 from equimorph.dynamics.model import Plant, Points, Row
 from equimorph.dynamics.rods import ChainedRod, stiffness_and_rest
 from equimorph.equilibria import settle

@@ -6,8 +6,9 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from equimorph.array_types import Float
-from equimorph.dynamics.chained import Chained
-from equimorph.dynamics.linkage import Bends, Linkage, Supports, Vector
+from equimorph.dynamics.chained import PlanarChained
+from equimorph.dynamics.linkage import Bends, Linkage, Supports
+from equimorph.dynamics.mechanism import Vector
 from equimorph.errors import MissingError
 from equimorph.structures import Frame, State, States
 from equimorph.structures.frame.inertia import member_masses
@@ -105,11 +106,11 @@ def _bends(model: FrameModel, links: int) -> Bends:
     return Bends(np.array(plus), np.array(minus), np.array(stiffness), np.array(rest))
 
 
-class ChainedFrame(Chained):
+class ChainedFrame(PlanarChained):
     """A frame and the chains of its members."""
 
     def __init__(self, frame: Frame, links: int) -> None:
-        self.structure, self._frame = frame, frame
+        self.structure, self._frame, self.links = frame, frame, links
         self.length, self.energy = frame.model.length, frame.energy_scale
         known = member_masses(frame.model)
         if known is None:

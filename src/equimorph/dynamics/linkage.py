@@ -10,16 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from equimorph.array_types import Bool, Float, Int
-
-Vector = Float[np.ndarray, " entries"]
-Pulls = Float[np.ndarray, " pulls"]
-"""Multipliers: the force on the far end of each member, x and y one after the other."""
-Settings = Float[np.ndarray, " settings"]
-"""Parameters of the structure and 1: tables times it are affine functions of the parameters."""
-
-LIGHT = 0.1
-"""Mass of a node that moves relative to that of a link; MuJoCo closes loops less sharply at lighter
-bodies (by 8e-4 of the length at 1e-3)."""
+from equimorph.dynamics.mechanism import LIGHT, Mechanism, Pulls, Settings, Vector
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,13 +50,13 @@ class Bends:
 
 
 @dataclass(frozen=True, eq=False)
-class Linkage:
+class Linkage(Mechanism):
     """Members of N rigid or stretching links between nodes, in non-dimensional form.
 
     Entries v: two coordinates of each node along its axes; its turn; angles of all links, member by
     member; their strains. ``L = ½ vᵀKv − v·s − Σ (P + λ)·l (1 + ε) t(θ) + …`` with the multipliers
     λ of the closure of each member, ``x_end − x_start − Σ l (1 + ε) t = 0``, and the dead forces P
-    beyond each link.
+    beyond each link. A multiplier is the force on the far end of a member, x and y in their turn.
 
     Attributes
     ----------
@@ -114,6 +105,11 @@ class Linkage:
     def size(self) -> int:
         """Number of entries."""
         return 3 * self.nodes + 2 * self.lengths.size
+
+    @property
+    def closures(self) -> int:
+        """Two for each member."""
+        return 2 * len(self.ends)
 
     @cached_property
     def turn_entries(self) -> Int[np.ndarray, " nodes"]:
@@ -180,10 +176,6 @@ class Linkage:
         return np.asarray(out)
 
     # --- places ---------------------------------------------------------------------------------
-
-    def prescribe(self, v: Vector, y: Settings) -> Vector:
-        """The entries with the prescribed ones set."""
-        return np.asarray(np.where(self.free, v, self.targets @ y))
 
     def node_places(self, v: Vector) -> Float[np.ndarray, "nodes 2"]:
         """Places of the nodes."""
@@ -332,8 +324,3 @@ class Linkage:
         arms, links = places[:, :-1] - places[:, :1], self.links(v)
         areas = 0.5 * (arms[..., 0] * links[..., 1] - arms[..., 1] * links[..., 0]).sum(axis=1)
         return float(out + (self.pressure @ y) @ areas)
-
-    @cached_property
-    def unknown(self) -> Bool[np.ndarray, " all"]:
-        """Free entries and all multipliers."""
-        return np.concatenate([self.free, np.ones(2 * len(self.ends), bool)])

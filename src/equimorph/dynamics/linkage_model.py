@@ -1,4 +1,4 @@
-"""Planar rods and frames in MuJoCo, with the statics of their chains."""
+"""Rods and frames in MuJoCo, with the statics of their chains."""
 
 from dataclasses import replace
 
@@ -8,9 +8,8 @@ from equimorph.array_types import Float
 from equimorph.dynamics.balance import Balance, Quasistatics, balance, follow
 from equimorph.dynamics.chained import Chained
 from equimorph.dynamics.fold_delay import fold_delay
-from equimorph.dynamics.linkage import Pulls, Settings, Vector
+from equimorph.dynamics.mechanism import Pulls, Settings, Simulation, Vector
 from equimorph.dynamics.model import Course, Model, Motion, Plant, Points, Row
-from equimorph.dynamics.plant import LinkagePlant
 from equimorph.structures import State, States
 
 
@@ -22,7 +21,7 @@ class LinkageModel(Model):
     def __init__(self, chained: Chained) -> None:
         self._chained, self.linkage = chained, chained.linkage
         self.structure, self.unit = chained.structure, chained.time
-        self.chain = self.linkage.lengths.shape[1] + 1
+        self.chain = chained.links + 1
 
     def settings(self, p: Row) -> Settings:
         """Parameters and 1."""
@@ -30,27 +29,14 @@ class LinkageModel(Model):
 
     def balance(self, state: State) -> Balance | None:
         """The chain's own equilibrium next to a state."""
-        linkage, chained = self.linkage, self._chained
         y = self.settings(state.p)
-        v = np.zeros(linkage.size)
-        places = chained.node_places(state)
-        v[: 2 * linkage.nodes] = np.einsum("nx,nax->na", places, linkage.supports.axes).ravel()
-        v[linkage.turn_entries] = chained.turns(state)
-        v[linkage.angle_entries] = chained.angles(state)
-        v[linkage.strain_entries] = self._strains(state, v)
-        v = linkage.prescribe(v, y)
-        return balance(linkage, v, self.multipliers(v, y), y)
-
-    def _strains(self, state: State, v: Vector) -> Float[np.ndarray, "members links"]:
-        places = self._chained.places(state.batch)[0] / self._chained.length
-        sizes = np.linalg.norm(np.diff(places, axis=1), axis=2)
-        stretch = np.isfinite(self.linkage.axial)
-        return np.asarray(np.where(stretch, sizes / self.linkage.lengths - 1.0, 0.0))
+        v = self.linkage.prescribe(self._chained.entries(state), y)
+        return balance(self.linkage, v, self.multipliers(v, y), y)
 
     def multipliers(self, v: Vector, y: Settings) -> Pulls:
         """Those with which the forces balance best."""
         linkage = self.linkage
-        none = np.zeros(2 * len(linkage.ends))
+        none = np.zeros(linkage.closures)
         free = np.flatnonzero(linkage.free)
         matrix = linkage.jacobian(v, none, y)[free][:, linkage.size :]
         return np.asarray(
@@ -59,11 +45,13 @@ class LinkageModel(Model):
 
     def points(self, v: Vector) -> Points:
         """Places of the joints, in the structure's unit of length."""
-        return np.asarray(self.linkage.places(v).reshape(-1, 2) * self._chained.length)
+        places = self.linkage.places(v)
+        return np.asarray(places.reshape(-1, places.shape[2]) * self._chained.length)
 
     def reference(self, states: States) -> Float[np.ndarray, "lanes points space"]:
         """Places at the same arclengths."""
-        return self._chained.places(states).reshape(len(states), -1, 2)
+        places = self._chained.places(states)
+        return places.reshape(len(states), -1, places.shape[3])
 
     def energy(self, v: Vector, y: Settings) -> float:
         """Potential energy in the structure's unit."""
@@ -80,7 +68,7 @@ class LinkageModel(Model):
 
     def plant(self, start: State, step: float, damping: float) -> Plant:
         """The chain in MuJoCo, at rest at its own equilibrium."""
-        return MovingLinkage(self, self.begin(start), step, damping)
+        return MovingLinkage(self, self.begin(start), self._chained.simulation(step, damping))
 
     def begin(self, start: State) -> Balance:
         """The chain's equilibrium at the start.
@@ -106,14 +94,12 @@ class LinkageModel(Model):
     ) -> Course:
         """The chain's equilibria, and the lateness at the fold where they end."""
         found = self.quasistatics(start, motion, times)
-        points = np.full(
-            (len(times), self.linkage.lengths.size + len(self.linkage.ends), 2), np.nan
-        )
+        last, delay = self.points(found.last.v), None
+        points = np.full((len(times), *last.shape), np.nan)
         for k, each in enumerate(found.balances):
             points[k] = self.points(each.v)
         if found.fold is None:
             return Course(points)
-        last, delay = self.points(found.last.v), None
         if np.isfinite(found.fold):
             delay = fold_delay(
                 found.last, found.fold, lambda t: self.settings(motion(t)), damping, self.unit
@@ -125,9 +111,8 @@ class LinkageModel(Model):
 class MovingLinkage(Plant):
     """A chain of links in MuJoCo."""
 
-    def __init__(self, model: LinkageModel, start: Balance, step: float, damping: float) -> None:
-        self._model = model
-        self._plant = LinkagePlant(model.linkage, step, damping)
+    def __init__(self, model: LinkageModel, start: Balance, simulation: Simulation) -> None:
+        self._model, self._plant = model, simulation
         self._plant.start(start.v, start.y)
         self._y = start.y
 

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from equimorph.array_types import Bool, Float, Int
-from equimorph.dynamics.linkage import Linkage, Settings, Vector
+from equimorph.dynamics.linkage import Linkage
+from equimorph.dynamics.mechanism import Settings, Simulation, Vector
 from equimorph.dynamics.tree import WORLD, tree_of
 from equimorph.dynamics.writer import Spring, Writer
 from equimorph.optional_packages import load_package
@@ -48,7 +49,7 @@ class _Rests:
             into[self.at[:count]] = values if into.ndim == 1 else values[:, None]
 
 
-class LinkagePlant:
+class LinkagePlant(Simulation):
     """A linkage that moves in MuJoCo under settings that change in time.
 
     Parameters
@@ -60,6 +61,8 @@ class LinkagePlant:
     damping
         Damping of every elastic joint over its stiffness.
     """
+
+    linkage: Linkage
 
     def __init__(self, linkage: Linkage, step: float, damping: float) -> None:
         self._mujoco = mujoco_module()
@@ -229,16 +232,6 @@ class LinkagePlant:
                 v[2 * at : 2 * at + 2] = linkage.supports.axes[at] @ place
                 stands[at] = True
         return v
-
-    @property
-    def closure(self) -> float:
-        """Largest distance by which a loop is open, relative to the unit of length."""
-        return float(np.abs(self.linkage.closure(self.v)).max(initial=0.0))
-
-    @property
-    def speed(self) -> float:
-        """Largest rate of a joint."""
-        return float(np.abs(self.data.qvel).max(initial=0.0))
 
     @property
     def kinetic(self) -> float:

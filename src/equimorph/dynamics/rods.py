@@ -1,47 +1,28 @@
 """Planar rods as linkages: joints that bend as the rod does between the middles of two links."""
 
-from collections.abc import Callable
-
 import numpy as np
 from scipy.interpolate import CubicSpline
 
 from equimorph.array_types import Float
-from equimorph.dynamics.chained import Chained
-from equimorph.dynamics.linkage import Bends, Linkage, Supports, Vector
-from equimorph.errors import MissingError
-from equimorph.structures import (
-    Couple,
-    Curvature,
-    LineLoad,
-    PointForce,
-    Pressure,
-    Rod,
-    State,
-    States,
-    Tendon,
+from equimorph.dynamics.cells import (
+    Function,
+    between,
+    holding_stiffness,
+    integrals,
+    joint_forces,
+    shares,
+    thrust,
+    time_of,
 )
+from equimorph.dynamics.chained import PlanarChained
+from equimorph.dynamics.linkage import Bends, Linkage, Supports
+from equimorph.dynamics.mechanism import Vector
+from equimorph.structures import Couple, Curvature, Pressure, Rod, State, States, Tendon
 from equimorph.structures.rod.construction import Construction, construction
-from equimorph.structures.rod.ends import FREE, HELD, Holding, support_axes
+from equimorph.structures.rod.ends import FREE, support_axes
 from equimorph.structures.rod.model import Build
 from equimorph.structures.rod.terms import Term
 from equimorph.structures.rod.units import FOUR_PI_SQUARED
-
-_GAUSS, _WEIGHTS = np.polynomial.legendre.leggauss(6)
-
-Function = Callable[[Float[np.ndarray, " points"]], Float[np.ndarray, " points"]]
-
-
-def integrals(
-    function: Function, edges: Float[np.ndarray, " edges"], breaks: Float[np.ndarray, " breaks"]
-) -> Float[np.ndarray, " cells"]:
-    """Integrals between successive edges, split where the function is not smooth."""
-    inner = breaks[(breaks > edges[0]) & (breaks < edges[-1])]
-    all_edges = np.unique(np.concatenate([edges, inner]))
-    half = 0.5 * np.diff(all_edges)[:, None]
-    points = all_edges[:-1, None] + half * (_GAUSS + 1.0)
-    pieces = (half * _WEIGHTS * function(points.ravel()).reshape(points.shape)).sum(axis=1)
-    cell = np.searchsorted(edges, 0.5 * (all_edges[1:] + all_edges[:-1]), side="right") - 1
-    return np.bincount(cell, pieces, len(edges) - 1)
 
 
 def rod_linkage(rod: Rod, links: int) -> Linkage:
@@ -76,7 +57,7 @@ def rod_linkage(rod: Rod, links: int) -> Linkage:
 
 
 def stiffness_and_rest(
-    made: Construction, cells: Float[np.ndarray, " edges"]
+    made: Construction[Build], cells: Float[np.ndarray, " edges"]
 ) -> tuple[Float[np.ndarray, " cells"], Float[np.ndarray, "cells settings"]]:
     """Moment per turn of the cells of a rod, in λ_cr L, and their turns without moment.
 
@@ -96,19 +77,15 @@ def _turning(term: Term, build: Build) -> Function:
     """Turn per arclength that a term of amplitude 1 gives a rod without moment."""
     if isinstance(term, Curvature):
         pattern = term.profile().density
-        return lambda s: _between(s, term.start, term.stop) * pattern(s)
+        return lambda s: between(s, term.start, term.stop) * pattern(s)
     if isinstance(term, Tendon):
         offset, stiff = term.profiles()[0].density, build.stiffness.density
-        return lambda s: _between(s, term.start, term.stop) * offset(s) * FOUR_PI_SQUARED / stiff(s)
+        return lambda s: between(s, term.start, term.stop) * offset(s) * FOUR_PI_SQUARED / stiff(s)
     return lambda s: np.zeros(len(s))
 
 
-def _between(s: np.ndarray, start: float, stop: float) -> np.ndarray:
-    return np.asarray(((s > start) & (s < stop)).astype(float))
-
-
 def _bends_and_supports(
-    made: Construction,
+    made: Construction[Build],
     links: int,
     stiffness: Float[np.ndarray, " cells"],
     rest: Float[np.ndarray, "cells settings"],
@@ -131,109 +108,63 @@ def _bends_and_supports(
             places[1, k] = made.row(axis.name)
     supports = Supports(
         np.array([[axis.unit for axis in axes]] * 2),
-        np.array([[_stiff(axis.first) for axis in axes], [_stiff(axis.last) for axis in axes]]),
+        np.array(
+            [
+                [holding_stiffness(axis.first) for axis in axes],
+                [holding_stiffness(axis.last) for axis in axes],
+            ]
+        ),
         places,
-        np.array([_stiff(first.angle), _stiff(last.angle)]),
+        np.array([holding_stiffness(first.angle), holding_stiffness(last.angle)]),
         turns,
         np.array([first.angle != FREE, last.angle != FREE]),
     )
     return Bends(plus[keep], minus[keep], stiffness[keep], rest[keep]), supports
 
 
-def _stiff(holding: Holding) -> float:
-    return {HELD: np.inf, FREE: 0.0}[holding] if isinstance(holding, str) else float(holding)
-
-
 def _loads(
-    made: Construction, nodes: Float[np.ndarray, " joints"], breaks: Float[np.ndarray, " breaks"]
+    made: Construction[Build],
+    nodes: Float[np.ndarray, " joints"],
+    breaks: Float[np.ndarray, " breaks"],
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Forces on the joints, couples on the links, and the pressure, as tables of the settings."""
     links, count = len(nodes) - 1, made.table.shape[1]
-    forces, couples = np.zeros((links + 1, 2, count)), np.zeros((links, count))
-    pressure = np.zeros(count)
+    couples, pressure = np.zeros((links, count)), np.zeros(count)
     for name, terms in made.build.terms.items():
         row = made.row(name)
         for term in terms:
-            if isinstance(term, LineLoad):
-                weights = _hats(term.density().density, nodes, breaks)
-            elif isinstance(term, PointForce):
-                weights = _shares(term.s * links, links + 1)
-            elif isinstance(term, Couple):
-                couples += np.outer(_shares(term.s * links - 0.5, links), row)
-                continue
+            if isinstance(term, Couple):
+                couples += np.outer(shares(term.s * links - 0.5, links), row)
             elif isinstance(term, Pressure):
                 pressure += row
-                continue
-            else:
-                continue
-            direction = np.array(term.direction[:2], dtype=float)
-            forces += np.einsum("j,x,k->jxk", weights, direction, row)
-    return forces, couples, pressure
-
-
-def _hats(
-    density: Function, nodes: Float[np.ndarray, " joints"], breaks: Float[np.ndarray, " breaks"]
-) -> Float[np.ndarray, " joints"]:
-    """Integrals of a density times the hat functions of the joints."""
-    whole = integrals(density, nodes, breaks)
-    moment = integrals(lambda s: s * density(s), nodes, breaks)
-    right = (moment - nodes[:-1] * whole) * (len(nodes) - 1)
-    out = np.zeros(len(nodes))
-    out[1:] += right
-    out[:-1] += whole - right
-    return out
-
-
-def _shares(place: float, count: int) -> Float[np.ndarray, " count"]:
-    """Weights of linear interpolation at a place counted in points."""
-    at = float(np.clip(place, 0.0, count - 1.0))
-    left = min(int(at), count - 2)
-    out = np.zeros(count)
-    out[left], out[left + 1] = 1.0 - (at - left), at - left
-    return out
+    return joint_forces(made, nodes, breaks)[:, :2], couples, pressure
 
 
 def _stretch(
-    made: Construction, nodes: Float[np.ndarray, " joints"], breaks: Float[np.ndarray, " breaks"]
+    made: Construction[Build],
+    nodes: Float[np.ndarray, " joints"],
+    breaks: Float[np.ndarray, " breaks"],
 ) -> tuple[np.ndarray, np.ndarray]:
     """Axial stiffness of the links, and their strains at rest under the thrust of tendons."""
     build, links = made.build, len(nodes) - 1
     strains = np.zeros((links, made.table.shape[1]))
     if build.axial is None:
         return np.full(links, np.inf), strains
-    softness = build.axial.density
-    axial = 1.0 / (links * integrals(lambda s: 1.0 / softness(s), nodes, breaks))
+    stiff = build.axial.density
+    axial = 1.0 / (links * integrals(lambda s: 1.0 / stiff(s), nodes, breaks))
     for name, terms in build.terms.items():
         for term in terms:
             if isinstance(term, Tendon):
-
-                def give(s: np.ndarray, term: Tendon = term) -> np.ndarray:
-                    return np.asarray(_between(s, term.start, term.stop) / softness(s))
-
-                shorter = links * build.length * integrals(give, nodes, breaks)
+                shorter = links * build.length * integrals(thrust(term, build.axial), nodes, breaks)
                 strains -= np.outer(shorter, made.row(name))
     return axial, strains
 
 
-def time_of(rod: Rod) -> float:
-    """T = √(m L/λ_cr) in the rod's unit of time.
-
-    Raises
-    ------
-    MissingError
-        For a rod with units and without a mass.
-    """
-    unit = rod.units.time()
-    if unit is None:
-        raise MissingError(f"`structure` must have a mass; the rod has none. {rod.massless}")
-    return unit
-
-
-class ChainedRod(Chained):
+class ChainedRod(PlanarChained):
     """A planar rod and its chain."""
 
     def __init__(self, rod: Rod, links: int) -> None:
-        self.structure, self._mechanics = rod, rod.mechanics
+        self.structure, self._mechanics, self.links = rod, rod.mechanics, links
         self.linkage = rod_linkage(rod, links)
         self.length, self.energy = rod.units.value("length"), rod.energy_scale
         self.time = time_of(rod)

@@ -7,9 +7,10 @@ from equimorph.dynamics.model import Model
 from equimorph.dynamics.own import OwnModel
 from equimorph.dynamics.plant import mujoco_module
 from equimorph.dynamics.rods import ChainedRod
+from equimorph.dynamics.spatial_rods import ChainedSpatialRod, check_isolated
 from equimorph.dynamics.trusses import TrussModel
 from equimorph.errors import InputError
-from equimorph.structures import Frame, Rod, State, Truss
+from equimorph.structures import Frame, Rod, SpatialRod, State, Truss
 
 
 def model_of(start: State, simulator: str, links: int) -> Model:
@@ -31,6 +32,9 @@ def model_of(start: State, simulator: str, links: int) -> Model:
         mujoco_module()
         if isinstance(structure, Rod):
             return LinkageModel(ChainedRod(structure, links))
+        if isinstance(structure, SpatialRod):
+            check_isolated(structure, start)
+            return LinkageModel(ChainedSpatialRod(structure, links))
         if isinstance(structure, Frame):
             return LinkageModel(ChainedFrame(structure, links))
         if isinstance(structure, Truss):

@@ -6,7 +6,8 @@ from functools import cached_property
 import numpy as np
 
 from equimorph.array_types import Float, Int
-from equimorph.dynamics.linkage import Linkage, Vector
+from equimorph.dynamics.linkage import Linkage
+from equimorph.dynamics.mechanism import Vector
 
 WORLD = -1
 

@@ -9,6 +9,7 @@ from equimorph.arrays import Lanes, Parameters
 from equimorph.dynamics.direct import DirectModel, DirectPlant
 from equimorph.dynamics.model import Plant, Row
 from equimorph.dynamics.plant import mujoco_module
+from equimorph.dynamics.writer import document
 from equimorph.errors import InputError
 from equimorph.structures import State, Truss
 
@@ -122,9 +123,4 @@ def _text(truss: Truss, masses: Float[np.ndarray, " unknowns"], step: float) -> 
         f'<site site="s{first}"/><site site="s{second}"/></spatial>'
         for first, second in made.ends.tolist()
     )
-    return (
-        '<mujoco><compiler angle="radian"/>'
-        f'<option timestep="{step}" integrator="discrete" gravity="0 0 0">'
-        '<flag contact="disable"/></option>'
-        f"<worldbody>{''.join(bodies)}</worldbody><tendon>{tendons}</tendon></mujoco>"
-    )
+    return document(step, "".join(bodies), tendons, "")

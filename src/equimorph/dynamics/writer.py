@@ -21,6 +21,33 @@ class Spring:
     rest: Float[np.ndarray, " settings"]
 
 
+def document(step: float, world: str, tendons: str, closed: str) -> str:
+    """XML of a model: bodies, tendons, and the equalities that close its loops."""
+    return (
+        '<mujoco><compiler angle="radian" autolimits="true"/>'
+        f'<option timestep="{step}" integrator="discrete" gravity="0 0 0" '
+        f'solver="Newton" iterations="{SOLVER_STEPS}" tolerance="1e-12">'
+        '<flag contact="disable" refsafe="disable"/></option>'
+        f"<worldbody>{world}</worldbody><tendon>{tendons}</tendon>"
+        f"<equality>{closed}</equality></mujoco>"
+    )
+
+
+def closing(kind: str, first: str, second: str, step: float) -> str:
+    """A connection, or a weld, of two sites, as sharp as the step allows."""
+    return (
+        f'<{kind} site1="{first}" site2="{second}" '
+        f'solref="{2.0 * step} 1" solimp="0.9999 0.9999 0.001 0.5 2"/>'
+    )
+
+
+def inertial(centre: float, mass: float, inertia: float) -> str:
+    """Mass of a body, with the same inertia about all axes."""
+    return (
+        f'<inertial pos="{centre} 0 0" mass="{mass}" diaginertia="{inertia} {inertia} {inertia}"/>'
+    )
+
+
 class Writer:
     """The model as MuJoCo reads it."""
 
@@ -47,18 +74,10 @@ class Writer:
         # a site at its body's origin would stay there: MuJoCo then never reads its place
         sites = "".join(f'<site name="w{node}" pos="1 1 0"/>' for node in sorted(worlds))
         close = "".join(
-            f'<connect site1="e{body}" site2="{"w" if node in worlds else "n"}{node}" '
-            f'solref="{2.0 * self.step} 1" solimp="0.9999 0.9999 0.001 0.5 2"/>'
+            closing("connect", f"e{body}", f"{'w' if node in worlds else 'n'}{node}", self.step)
             for body, node in self.tree.closed
         )
-        return (
-            '<mujoco><compiler angle="radian" autolimits="true"/>'
-            f'<option timestep="{self.step}" integrator="discrete" gravity="0 0 0" '
-            f'solver="Newton" iterations="{SOLVER_STEPS}" tolerance="1e-12">'
-            '<flag contact="disable" refsafe="disable"/></option>'
-            f"<worldbody>{sites}{bodies}</worldbody><tendon>{self._tendons()}</tendon>"
-            f"<equality>{close}</equality></mujoco>"
-        )
+        return document(self.step, sites + bodies, self._tendons(), close)
 
     # --- bodies ---------------------------------------------------------------------------------
 
@@ -90,7 +109,7 @@ class Writer:
             yield self._hinge(k)
         yield f'<site name="n{body.node}"/>'
         mass = self.linkage.node_mass
-        yield self._inertia(0.0, mass, mass * self._size**2)
+        yield inertial(0.0, mass, mass * self._size**2)
 
     def _link(self, k: int) -> Iterator[str]:
         body, linkage = self.tree.bodies[k], self.linkage
@@ -103,15 +122,8 @@ class Writer:
             rest = size * linkage.strains.reshape(linkage.axial.size, -1)[body.link]
             yield self._joint("slide", "1 0 0", axial / size, rest)
         mass = float(linkage.masses.ravel()[body.link])
-        yield self._inertia(0.5 * size, mass, mass * size**2 / 12.0)
+        yield inertial(0.5 * size, mass, mass * size**2 / 12.0)
         yield f'<site name="e{k}" pos="{size} 0 0"/>'
-
-    @staticmethod
-    def _inertia(centre: float, mass: float, inertia: float) -> str:
-        return (
-            f'<inertial pos="{centre} 0 0" mass="{mass}" '
-            f'diaginertia="{inertia} {inertia} {inertia}"/>'
-        )
 
     def _hinge(self, k: int) -> str:
         self.hinge[k] = self._joints
