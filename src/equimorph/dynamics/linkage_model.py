@@ -8,8 +8,9 @@ from equimorph.array_types import Float
 from equimorph.dynamics.balance import Balance, Quasistatics, balance, follow
 from equimorph.dynamics.chained import Chained
 from equimorph.dynamics.fold_delay import fold_delay
-from equimorph.dynamics.mechanism import Pulls, Settings, Simulation, Vector
+from equimorph.dynamics.mechanism import Pulls, Settings, Vector
 from equimorph.dynamics.model import Course, Model, Motion, Plant, Points, Row
+from equimorph.dynamics.simulation import Simulation
 from equimorph.structures import State, States
 
 

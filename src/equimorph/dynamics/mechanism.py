@@ -1,8 +1,7 @@
-"""Rigid bodies with elastic joints: what their statics and their simulation have in common."""
+"""Rigid bodies with elastic joints: what all chains have in common."""
 
 from abc import ABC, abstractmethod
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
@@ -82,43 +81,3 @@ class Mechanism(ABC):
     def unknown(self) -> Bool[np.ndarray, " all"]:
         """Free entries and all multipliers."""
         return np.concatenate([self.free, np.ones(self.closures, bool)])
-
-
-class Simulation(ABC):
-    """A mechanism that moves in MuJoCo under settings that change in time."""
-
-    linkage: Mechanism
-    model: Any
-    data: Any
-
-    @abstractmethod
-    def start(self, v: Vector, y: Settings) -> None:
-        """Place the mechanism at rest."""
-
-    @abstractmethod
-    def set(self, y: Settings) -> None:
-        """Set the actuators and loads."""
-
-    @abstractmethod
-    def step(self) -> None:
-        """One step in time."""
-
-    @property
-    @abstractmethod
-    def v(self) -> Vector:
-        """Entries of the mechanism; places of nodes that members carry are theirs."""
-
-    @property
-    @abstractmethod
-    def kinetic(self) -> float:
-        """Kinetic energy."""
-
-    @property
-    def closure(self) -> float:
-        """Largest distance by which a loop is open, relative to the unit of length."""
-        return float(np.abs(self.linkage.closure(self.v)).max(initial=0.0))
-
-    @property
-    def speed(self) -> float:
-        """Largest rate of a joint."""
-        return float(np.abs(self.data.qvel).max(initial=0.0))

@@ -5,24 +5,17 @@ See docs/time.md for the model, and docs/decisions.md for what was measured.
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
 from equimorph.array_types import Bool, Float, Int
 from equimorph.dynamics.linkage import Linkage
-from equimorph.dynamics.mechanism import Settings, Simulation, Vector
+from equimorph.dynamics.mechanism import Settings, Vector
+from equimorph.dynamics.simulation import Simulation
 from equimorph.dynamics.tree import WORLD, tree_of
 from equimorph.dynamics.writer import Spring, Writer
-from equimorph.optional_packages import load_package
 
 Angles = Float[np.ndarray, " bodies"]
-
-
-def mujoco_module() -> Any:
-    """MuJoCo, which only a replay needs; see `load_package`."""
-    otherwise = ', or choose simulator="own", which is not independent'
-    return load_package("mujoco", "replay", "simulator", otherwise)
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,11 +58,9 @@ class LinkagePlant(Simulation):
     linkage: Linkage
 
     def __init__(self, linkage: Linkage, step: float, damping: float) -> None:
-        self._mujoco = mujoco_module()
         self.linkage, self.tree = linkage, tree_of(linkage)
         writer = Writer(self.tree, step, damping)
-        self.model: Any = self._mujoco.MjModel.from_xml_string(writer.text())
-        self.data: Any = self._mujoco.MjData(self.model)
+        super().__init__(writer.text())
         self._springs = tuple(_Rests.of(each) for each in writer.springs())
         self._hinge = np.array([writer.hinge[k] for k in range(len(self.tree.bodies))])
         self._hinged = np.flatnonzero(self._hinge >= 0)

@@ -5,8 +5,8 @@ from equimorph.dynamics.frames import ChainedFrame
 from equimorph.dynamics.linkage_model import LinkageModel
 from equimorph.dynamics.model import Model
 from equimorph.dynamics.own import OwnModel
-from equimorph.dynamics.plant import mujoco_module
 from equimorph.dynamics.rods import ChainedRod
+from equimorph.dynamics.simulation import mujoco_module
 from equimorph.dynamics.spatial_rods import ChainedSpatialRod, check_isolated
 from equimorph.dynamics.trusses import TrussModel
 from equimorph.errors import InputError

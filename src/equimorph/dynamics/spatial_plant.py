@@ -7,8 +7,8 @@ the simulation knows how fast they move and that they will.
 import numpy as np
 
 from equimorph.array_types import Float, Int
-from equimorph.dynamics.mechanism import LIGHT, Settings, Simulation, Vector
-from equimorph.dynamics.plant import mujoco_module
+from equimorph.dynamics.mechanism import LIGHT, Settings, Vector
+from equimorph.dynamics.simulation import Simulation
 from equimorph.dynamics.spatial_chain import CLAMP_AXES, SpatialChain, cross
 from equimorph.dynamics.writer import closing, document, inertial
 
@@ -20,25 +20,13 @@ TIP = 1.0
 
 
 class SpatialPlant(Simulation):
-    """A chain in space that moves in MuJoCo under settings that change in time.
-
-    Parameters
-    ----------
-    chain
-        What moves; units of its own.
-    step
-        Step in time.
-    damping
-        Damping of every elastic joint over its stiffness.
-    """
+    """A chain in space in MuJoCo; arguments as of `LinkagePlant`."""
 
     linkage: SpatialChain
 
     def __init__(self, chain: SpatialChain, step: float, damping: float) -> None:
-        self._mujoco = mujoco_module()
         self.linkage, self._step, self._damping = chain, step, damping
-        self.model = self._mujoco.MjModel.from_xml_string(self._text())
-        self.data = self._mujoco.MjData(self.model)
+        super().__init__(self._text())
         name = self._mujoco.mjtObj.mjOBJ_BODY
         self._bodies = [
             self._mujoco.mj_name2id(self.model, name, f"b{k}") for k in range(chain.links + 1)

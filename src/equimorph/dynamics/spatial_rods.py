@@ -16,7 +16,8 @@ from equimorph.dynamics.cells import (
     time_of,
 )
 from equimorph.dynamics.chained import Chained
-from equimorph.dynamics.mechanism import Simulation, Vector
+from equimorph.dynamics.mechanism import Vector
+from equimorph.dynamics.simulation import Simulation
 from equimorph.dynamics.spatial_chain import ANCHOR, REST, STIFF, Axes, SpatialChain
 from equimorph.dynamics.spatial_plant import SpatialPlant
 from equimorph.errors import InputError

@@ -8,7 +8,7 @@ from equimorph.array_types import Float
 from equimorph.arrays import Lanes, Parameters
 from equimorph.dynamics.direct import DirectModel, DirectPlant
 from equimorph.dynamics.model import Plant, Row
-from equimorph.dynamics.plant import mujoco_module
+from equimorph.dynamics.simulation import mujoco_module
 from equimorph.dynamics.writer import document
 from equimorph.errors import InputError
 from equimorph.structures import State, Truss
