@@ -55,6 +55,9 @@ _CALL = re.compile(r"(\w+)(?:\(([\w,-]+)\))?")
 """Text of a descriptor: its name, and its arguments in parentheses if it has some."""
 Velocities = Float[np.ndarray, "lanes k unknowns"]
 Product = Callable[[Velocities], Velocities]
+Velocity = Float[np.ndarray, "lanes unknowns"]
+INERTIA_DIFFERENCE = 1e-5
+"""Step of the unknowns in differences of the mass matrix."""
 
 
 @dataclass(frozen=True)
@@ -184,6 +187,24 @@ class Structure(Rebuilt, Equations):
         """Function that multiplies k velocities in each lane by M; see `inertia`."""
         mass = self.inertia(z, p)
         return lambda v: np.asarray(v @ mass)
+
+    def inertial_force(self, z: Lanes, p: Parameters, velocity: Velocity) -> Velocity:
+        """Γ(u)[u̇, u̇] in ``d/dt ∂T/∂u̇ − ∂T/∂u = M ü + Γ``, while the parameters rest.
+
+        Here by central differences of M along all unknowns; structures whose J is at hand give
+        ``JᵀW D²x[u̇, u̇]``, with the places x of their material points.
+        """
+        n, step = self.unknowns, INERTIA_DIFFERENCE
+        twice = np.empty_like(velocity)
+        for i in range(n):
+            shift = np.zeros_like(z)
+            shift[:, i] = step
+            change = self.inertia(z + shift, p) - self.inertia(z - shift, p)
+            twice[:, i] = np.einsum("li,lij,lj->l", velocity, change, velocity)
+        moved = np.zeros_like(z)
+        moved[:, :n] = step * velocity
+        along = self.inertia(z + moved, p) - self.inertia(z - moved, p)
+        return np.asarray((np.einsum("lij,lj->li", along, velocity) - 0.5 * twice) / (2.0 * step))
 
     def effort_unit(self, parameter: Parameter) -> str:
         """Unit of the effort of a parameter, like N m for an angle."""

@@ -11,7 +11,7 @@ from equimorph.array_types import Float
 from equimorph.arrays import Lanes, Parameters
 from equimorph.structures.contract import Symmetry
 from equimorph.structures.frame.described import DescribedFrame
-from equimorph.structures.frame.inertia import frame_inertia, member_masses
+from equimorph.structures.frame.inertia import frame_material, member_masses
 from equimorph.structures.frame.member import MemberSpec, SupportSpec
 from equimorph.structures.frame.model import FrameModel
 from equimorph.structures.frame.network import frame_network
@@ -116,4 +116,13 @@ class Frame(DescribedFrame):
     def inertia(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes unknowns unknowns"]:
         """Mass matrix of the members, each as heavy everywhere."""
         masses = member_masses(self.model)
-        return super().inertia(z, p) if masses is None else frame_inertia(self, masses, z, p)
+        if masses is None:
+            return super().inertia(z, p)
+        return frame_material(self, masses).inertia(z, p)
+
+    def inertial_force(self, z: Lanes, p: Parameters, velocity: Lanes) -> Lanes:
+        """Forces of inertia of the members at constant rates of the unknowns."""
+        masses = member_masses(self.model)
+        if masses is None:
+            return super().inertial_force(z, p, velocity)
+        return frame_material(self, masses).inertial_force(z, p, velocity)

@@ -7,7 +7,7 @@ from equimorph.arrays import Lanes, Parameters
 from equimorph.model.units import STANDARD_GRAVITY
 from equimorph.structures.frame.fields import FrameFields
 from equimorph.structures.frame.model import FrameModel
-from equimorph.structures.places_inertia import inertia_of_places
+from equimorph.structures.places_inertia import MaterialPoints
 
 
 def member_masses(model: FrameModel) -> Float[np.ndarray, " members"] | None:
@@ -25,14 +25,14 @@ def member_masses(model: FrameModel) -> Float[np.ndarray, " members"] | None:
     return np.array(found)
 
 
-def frame_inertia(
-    frame: FrameFields, masses: Float[np.ndarray, " members"], z: Lanes, p: Parameters
-) -> Float[np.ndarray, "lanes unknowns unknowns"]:
-    """Mass matrix of a frame with members that are as heavy everywhere, in units of its energy."""
+def frame_material(
+    frame: FrameFields, masses: Float[np.ndarray, " members"]
+) -> MaterialPoints:
+    """Members that are as heavy everywhere, in units of the frame's energy."""
     model = frame.model
 
     def places(z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes points 2"]:
         return frame.outline(z, p, model.mesh.nodes).reshape(len(z), -1, 2)
 
     heavy = masses * model.length**2 / frame.energy_scale
-    return inertia_of_places(frame, places, np.outer(heavy, model.mesh.weights).ravel(), z, p)
+    return MaterialPoints(frame, places, np.outer(heavy, model.mesh.weights).ravel())

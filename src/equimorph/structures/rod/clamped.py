@@ -29,7 +29,7 @@ from equimorph.structures.rod.clamped_derivative_kernels import (
 from equimorph.structures.rod.clamped_kernels import advance_lanes
 from equimorph.structures.rod.discretisation import Mesh
 from equimorph.structures.rod.fields import ClampedFields
-from equimorph.structures.rod.inertia import inextensible_inertia
+from equimorph.structures.rod.inertia import inextensible_force, inextensible_inertia
 from equimorph.structures.rod.mechanics import PlanarMechanics
 from equimorph.structures.rod.profiles import LoadShape
 from equimorph.structures.rod.units import FOUR_PI_SQUARED
@@ -162,6 +162,11 @@ class ClampedMechanics(PlanarMechanics):
     def inertia(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes unknowns unknowns"]:
         """JᵀWJ of the inner nodes' angles."""
         return inextensible_inertia(self.mesh, self.nodal_angles(z, p))[:, 1:-1, 1:-1]
+
+    def inertial_force(self, z: Lanes, p: Parameters, velocity: Lanes) -> Lanes:
+        """Γ of the inner nodes' angles."""
+        rates = np.pad(velocity, ((0, 0), (1, 1)))
+        return inextensible_force(self.mesh, self.nodal_angles(z, p), rates)[:, 1:-1]
 
     def solve(
         self, z: Lanes, p: Parameters, rhs: Sides, border: AnyBorder = None, shift: Shift = None

@@ -22,11 +22,12 @@ from equimorph.structures.rod.discretisation import Reference
 from equimorph.structures.rod.fields import GeneralFields
 from equimorph.structures.rod.general_kernels import linearise_lanes, second_lanes
 from equimorph.structures.rod.general_step_kernels import advance_lanes
-from equimorph.structures.rod.inertia import kinetic_matrix, place_derivatives
+from equimorph.structures.rod.inertia import following, moved_places, place_derivatives
 from equimorph.structures.rod.mechanics import LARGEST_TAIL, PlanarMechanics
 from equimorph.structures.rod.model import RodModel, pack_tables
 from equimorph.structures.rod.pressure import EnclosedArea, lower_triangle
 from equimorph.structures.rod.symmetry import symmetries
+from equimorph.tolerances import METRIC_DIFFERENCE
 
 Points = Float[np.ndarray, "lanes points"]
 
@@ -199,10 +200,32 @@ class GeneralMechanics(JointEquations, PlanarMechanics):
 
     def inertia(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes unknowns unknowns"]:
         """JᵀWJ of the unknown angles."""
-        columns = place_derivatives(self.model, self.nodal_angles(z, p), self.scalars(z, p))
+        moved = self._moved_places(z, p, self._following(z, p))
+        return np.asarray(moved.transpose(0, 2, 1) @ (self._place_weights[:, None] * moved))
+
+    def inertial_force(self, z: Lanes, p: Parameters, velocity: Lanes) -> Lanes:
+        """JᵀW D²x[u̇, u̇] of the unknown angles, by central differences of J."""
+        follow = self._following(z, p)
+        along = np.concatenate([velocity, np.einsum("lcu,lu->lc", follow, velocity)], axis=1)
+        step = METRIC_DIFFERENCE * along
+        ahead, behind = (self._moved_places(z + way, p, follow) for way in (step, -step))
+        bend = np.einsum("lpu,lu->lp", ahead - behind, velocity) / (2.0 * METRIC_DIFFERENCE)
+        moved = self._moved_places(z, p, follow)
+        return np.asarray(np.einsum("lpu,lp->lu", moved, self._place_weights * bend))
+
+    @property
+    def _place_weights(self) -> Float[np.ndarray, " places"]:
+        return np.repeat(self.mesh.weights, 2)
+
+    def _following(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes m unknowns"]:
         _, gradients, trailing = self.parts(z, p)
-        inner = self.unknown_nodes
-        return kinetic_matrix(self.model, columns, gradients[:, :, inner], trailing, inner)
+        return following(gradients[:, :, self.unknown_nodes], trailing)
+
+    def _moved_places(
+        self, z: Lanes, p: Parameters, follow: Float[np.ndarray, "lanes m unknowns"]
+    ) -> Float[np.ndarray, "lanes places unknowns"]:
+        columns = place_derivatives(self.model, self.nodal_angles(z, p), self.scalars(z, p))
+        return moved_places(columns, follow, self.unknown_nodes)
 
     def linearised(self, z: Lanes, p: Parameters, dp: Parameters) -> tuple[np.ndarray, ...]:
         """F, F_p·dp, and the parts of F_z: diagonal, border, trailing block."""

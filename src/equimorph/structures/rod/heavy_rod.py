@@ -22,6 +22,10 @@ class HeavyRod(Structure):
     ) -> Float[np.ndarray, "lanes unknowns unknowns"]:
         """Physical mass matrix of a rod of mass 1, in units of its mass and length."""
 
+    @abstractmethod
+    def inertial_force_in_lengths(self, z: Lanes, p: Parameters, velocity: Lanes) -> Lanes:
+        """Γ of a rod of mass 1, see `Structure.inertial_force`, in units of its mass and length."""
+
     @property
     def time_unit(self) -> str:
         """T, or s of a rod with EI and length."""
@@ -47,3 +51,10 @@ class HeavyRod(Structure):
         if unit is None:
             return super().inertia(z, p)
         return unit**2 * self.inertia_in_lengths(z, p)
+
+    def inertial_force(self, z: Lanes, p: Parameters, velocity: Lanes) -> Lanes:
+        """Forces of inertia at constant rates of the unknowns."""
+        unit = self.units.time()
+        if unit is None:
+            return super().inertial_force(z, p, velocity)
+        return unit**2 * self.inertial_force_in_lengths(z, p, velocity)

@@ -14,9 +14,9 @@ from equimorph.arrays import Nodal, Scalars
 from equimorph.structures.rod.discretisation import Mesh
 from equimorph.structures.rod.model import RodModel
 
-Masses = Float[np.ndarray, "lanes unknowns unknowns"]
 Turns = Float[np.ndarray, "lanes nodes 2 angles"]
 Pulls = Float[np.ndarray, "lanes nodes 2 multipliers"]
+Places = Float[np.ndarray, "lanes places unknowns"]
 RANK = 1e-10
 """Relative size below which a compliance counts as none: such supports do not give way."""
 
@@ -34,6 +34,12 @@ def inextensible_inertia(mesh: Mesh, theta: Nodal) -> Float[np.ndarray, "lanes n
     ``M_jk = (IᵀWI)_jk cos(θ_j − θ_k)``.
     """
     return np.asarray(_moments(mesh) * np.cos(theta[:, :, None] - theta[:, None, :]))
+
+
+def inextensible_force(mesh: Mesh, theta: Nodal, rates: Nodal) -> Nodal:
+    """Γ of all nodal angles of the same rod: ``Γ_j = Σ (IᵀWI)_jk sin(θ_j − θ_k) θ̇_k²``."""
+    turned = _moments(mesh) * np.sin(theta[:, :, None] - theta[:, None, :])
+    return np.asarray(np.einsum("ljk,lk->lj", turned, rates**2))
 
 
 @lru_cache(maxsize=32)
@@ -74,23 +80,21 @@ def place_derivatives(model: RodModel, theta: Nodal, y: Scalars) -> tuple[Turns,
     return angular, forced
 
 
-def kinetic_matrix(
-    model: RodModel,
-    columns: tuple[Turns, Pulls],
-    gradients: Float[np.ndarray, "lanes m unknowns"],
-    trailing: Float[np.ndarray, "lanes m m"],
-    unknown: slice,
-) -> Masses:
-    """Mass matrix of the unknown angles, total mass 1.
+def following(
+    gradients: Float[np.ndarray, "lanes m unknowns"], trailing: Float[np.ndarray, "lanes m m"]
+) -> Float[np.ndarray, "lanes m unknowns"]:
+    """Rates of the multipliers by those of the angles: ``C δθ + D δλ = 0``.
 
-    Where supports or the rod give way, its multipliers follow from the angles by the constraints
-    ``C δθ + D δλ = 0``, with C the `gradients` and D the `trailing` block of F_z.
+    C are the `gradients` and D the `trailing` block of F_z; only where supports or the rod give
+    way, D and the rates are not zero.
     """
+    return np.asarray(-np.linalg.pinv(trailing, rcond=RANK, hermitian=True) @ gradients)
+
+
+def moved_places(columns: tuple[Turns, Pulls], follow: Float[np.ndarray, "lanes m unknowns"], unknown: slice) -> Places:
+    """Derivatives of all places, one after the other, by the unknown angles."""
     angular, forced = columns
     moved = angular[:, :, :, unknown]
-    if trailing.any():
-        follow = -np.linalg.pinv(trailing, rcond=RANK, hermitian=True) @ gradients
+    if follow.any():
         moved = moved + np.einsum("lnac,lcu->lnau", forced, follow)
-    flat = moved.reshape(len(moved), -1, moved.shape[3])
-    weights = np.repeat(model.mesh.weights, 2)
-    return np.asarray(flat.transpose(0, 2, 1) @ (weights[:, None] * flat))
+    return moved.reshape(len(moved), -1, moved.shape[3])

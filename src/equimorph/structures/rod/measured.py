@@ -42,6 +42,10 @@ class Measured(AnyRod):
         """Mass matrix of a rod of mass 1."""
         return self.mechanics.inertia(z, p)
 
+    def inertial_force_in_lengths(self, z: Lanes, p: Parameters, velocity: Lanes) -> Lanes:
+        """Γ of a rod of mass 1."""
+        return self.mechanics.inertial_force(z, p, velocity)
+
     def largest_curvature(self, z: Lanes, p: Parameters) -> tuple[Values, Values]:
         """max_s |κ(s)|, ends and interior extrema included, and the arclength where it occurs."""
         value, place = self.mechanics.largest_curvature(z, p)

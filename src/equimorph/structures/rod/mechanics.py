@@ -125,6 +125,10 @@ class PlanarMechanics(RodMechanics):
     def inertia(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes unknowns unknowns"]:
         """Physical mass matrix JᵀWJ of a rod of total mass 1, in units of L and of its mass."""
 
+    @abstractmethod
+    def inertial_force(self, z: Lanes, p: Parameters, velocity: Lanes) -> Lanes:
+        """Γ of a rod of total mass 1, see `Structure.inertial_force`, in units of L."""
+
     @property
     @abstractmethod
     def unknown_nodes(self) -> slice:

@@ -10,7 +10,7 @@ from equimorph.array_types import Float
 from equimorph.arrays import Lanes, Parameters, Values
 from equimorph.errors import InputError
 from equimorph.model import Descriptor, remember_call
-from equimorph.structures.places_inertia import inertia_of_places
+from equimorph.structures.places_inertia import MaterialPoints
 from equimorph.structures.rod.any_rod import (
     COORDINATES,
     AnyRod,
@@ -79,12 +79,18 @@ class DescribedInSpace(AnyRod):
         self, z: Lanes, p: Parameters
     ) -> Float[np.ndarray, "lanes unknowns unknowns"]:
         """Mass matrix of a rod of mass 1: masses at the nodes of the elements."""
+        return self._material.inertia(z, p)
 
+    def inertial_force_in_lengths(self, z: Lanes, p: Parameters, velocity: Lanes) -> Lanes:
+        """Γ of the same masses."""
+        return self._material.inertial_force(z, p, velocity)
+
+    @property
+    def _material(self) -> MaterialPoints:
         def places(z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes points 3"]:
             return self.recovery.nodal(z, p).places.reshape(len(z), -1, 3)
 
-        weights = self.mesh.element_weights.ravel()
-        return inertia_of_places(self.mechanics, places, weights, z, p)
+        return MaterialPoints(self.mechanics, places, self.mesh.element_weights.ravel())
 
     def frames(
         self, z: Lanes, p: Parameters, s: Arclengths | None = None

@@ -160,6 +160,11 @@ class Truss(TrussMechanics):
             return super().inertia_product(z, p)
         return lambda v: np.asarray(self._nodal_masses * v)
 
+    def inertial_force(self, z: Lanes, p: Parameters, velocity: Lanes) -> Lanes:
+        """Zero: the mass matrix is constant."""
+        del z, p
+        return np.zeros_like(velocity)
+
     @property
     def _rest_load(self) -> Float[np.ndarray, "1 parameters"]:
         return np.zeros((1, len(self.parameters)))
