@@ -123,6 +123,11 @@ from .manifold import (
     SetBarriers as SetBarriers,
     Barriers as Barriers,
 )
+from .dynamics import (
+    least_shock as least_shock,
+    LeastShock as LeastShock,
+    Shock as Shock,
+)
 
 # Follow critical states
 from .equilibria import (

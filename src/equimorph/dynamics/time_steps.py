@@ -10,6 +10,7 @@ from equimorph.arrays import Flags, Lanes, Parameters, Values
 from equimorph.columns import Columns
 from equimorph.equilibria.soft_modes import metric_length
 from equimorph.structures import Structure
+from equimorph.structures.dense import dense_matrices
 
 NEWTON_STEPS = 25
 CONVERGED = 1e-9
@@ -98,16 +99,3 @@ class Motion(Columns):
 
 def _times(matrix: Float[np.ndarray, "lanes m m"], x: Float[np.ndarray, "lanes m"]) -> Lanes:
     return np.asarray((matrix @ x[:, :, None])[:, :, 0])
-
-
-def dense_matrices(
-    structure: Structure, z: Lanes, p: Parameters
-) -> Float[np.ndarray, "lanes size size"]:
-    """F_z, from solves with it and a shift, which is regular at folds, too."""
-    lanes, size, shift = len(z), structure.size, -1.0
-    units = np.repeat(np.eye(size)[None], lanes, axis=0)
-    inverse = structure.solve(z, p, units, None, np.full(lanes, shift)).x
-    out = np.linalg.inv(inverse.transpose(0, 2, 1))
-    at = np.arange(structure.unknowns)
-    out[:, at, at] += shift * structure.mass
-    return np.asarray(out)

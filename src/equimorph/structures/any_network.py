@@ -88,7 +88,8 @@ class AnyNetwork(DiscreteStructure):
     def effort_unit(self, parameter: Parameter) -> str:
         """Unit of the effort of a parameter, like N for a length."""
         unit = parameter.unit
-        return CONJUGATE[unit] if self.system.plain else self.system.conjugate(unit)
+        known = CONJUGATE.get(unit) if self.system.plain else self.system.conjugate(unit)
+        return super().effort_unit(parameter) if known is None else known
 
     def symmetries(self) -> tuple[Symmetry, ...]:
         """Mirror images and half turns that leave the network as it is."""

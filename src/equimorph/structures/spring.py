@@ -24,6 +24,8 @@ from equimorph.structures.contract import Structure, Symmetry
 from equimorph.structures.equations import AnyBorder, Direction, Enclosed, Shift
 from equimorph.structures.states import State, natural_state
 
+EFFORTS = {"natural length": "force", "k": "length", "force/length": "length²"}
+"""Units of efforts by those of their parameters."""
 
 @check_arguments
 class Spring(Structure):
@@ -213,8 +215,8 @@ class Spring(Structure):
     energy_unit = "force·length"
 
     def effort_unit(self, parameter: Parameter) -> str:
-        """Unit of the effort of a parameter."""
-        return {"x_l": "force", "F": "length", "k": "length²"}[parameter.name]
+        """Unit of the effort of a parameter: of a force for a length."""
+        return EFFORTS.get(parameter.unit) or super().effort_unit(parameter)
 
     @cached_property
     @remember_call

@@ -1,0 +1,139 @@
+"""What becomes of structures that are launched: whether they come back, and where they land."""
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+
+from equimorph.array_types import Int
+from equimorph.arrays import Flags, Lanes, Parameters, Values
+from equimorph.columns import Columns
+from equimorph.dynamics.time_steps import Motion
+from equimorph.equilibria.gradient_flow import Ending, gradient_flow
+from equimorph.equilibria.soft_modes import extent_of_guesses, metric_length, soft_modes
+from equimorph.structures import Structure
+from equimorph.tolerances import SAME_SOLUTION
+
+LOOKED_AT = 0.2
+"""Time after which it is seen which motions are decided, in units of the model's time T."""
+NEAR_TOP = 0.9
+"""Share of the height of the saddle that potential energy reaches on the edge of the basin, less
+what it may change within a step."""
+PATIENCE = 12.0
+"""Longest time of a motion, in times in which free vibrations lose energy by the factor e."""
+AT_LEAST = 40.0
+"""And the shortest limit, in units of the model's time T."""
+FARTHEST = 10.0
+"""Way in the metric after which a motion has left for infinity, in extents of the guesses."""
+
+
+class Outcome(IntEnum):
+    """What became of a motion."""
+
+    OPEN = -1
+    """It still moved with more energy than the lowest saddle when time was over."""
+    HELD = 0
+    LEFT = 1
+    ESCAPED = 2
+    LOST = 3
+    """A step in time was not found."""
+
+
+@dataclass(frozen=True)
+class Launches(Columns):
+    """Structures that begin to move.
+
+    z, p, velocity: at the start; home: unknowns of the stable state that counts as held; level:
+    energy of the lowest saddle on the edge of its basin, in units of `Structure.energy`.
+    """
+
+    z: Lanes
+    p: Parameters
+    velocity: Lanes
+    home: Lanes
+    level: Values
+
+
+@dataclass(frozen=True)
+class Clock:
+    """Step in time and damping: C = `rate` M; `unit` is the model's time T."""
+
+    step: float
+    rate: float
+    unit: float
+
+    @property
+    def steps(self) -> int:
+        """Most steps of one motion."""
+        longest = max(AT_LEAST * self.unit, PATIENCE / self.rate)
+        return int(np.ceil(longest / self.step))
+
+    @property
+    def looks(self) -> int:
+        """Steps after which it is seen which motions are decided."""
+        return max(1, round(LOOKED_AT * self.unit / self.step))
+
+
+@dataclass(frozen=True)
+class Outcomes:
+    """`Outcome` of each launch, and where each was when it was decided."""
+
+    code: Int[np.ndarray, " lanes"]
+    z: Lanes
+    velocity: Lanes
+
+
+def play(structure: Structure, launches: Launches, clock: Clock, *, watch: bool) -> Outcomes:
+    """Let structures move until their energy is below that of the lowest saddle around their home.
+
+    From then on each motion stays in the piece of the configurations below that energy in which it
+    is, at home or elsewhere, and the gradient flow tells which. With `watch` a motion has left as
+    soon as the flow leads elsewhere from where it is, even if it would come back later.
+    """
+    count = len(launches.z)
+    code, todo = np.full(count, int(Outcome.OPEN)), np.arange(count)
+    motion = Motion.of(launches.z, launches.velocity)
+    last, speed = launches.z.copy(), launches.velocity.copy()
+    bottom = structure.energy(launches.home, launches.p)
+    edge = bottom + NEAR_TOP * (launches.level - bottom)
+    highest, every = structure.energy(launches.z, launches.p), clock.looks
+    far = FARTHEST * extent_of_guesses(structure, launches.p)
+    for number in range(clock.steps):
+        p = launches.p[todo]
+        highest[todo] = np.maximum(highest[todo], structure.energy(motion.z, p))
+        if number % every == 0:
+            low = motion.energy(structure, p) < launches.level[todo]
+            seen = np.flatnonzero(low | (watch & (highest[todo] >= edge[todo])))
+            highest[todo] = -np.inf
+            now = np.where(low, int(Outcome.HELD), int(Outcome.OPEN))
+            away, lost = _away(structure, motion.z[seen], launches.take(todo[seen]))
+            now[seen[away]] = Outcome.LEFT
+            now[seen[lost & low[seen]]] = Outcome.LOST
+            way = (motion.z - launches.z[todo])[:, : structure.unknowns]
+            now[metric_length(structure, way) > far] = Outcome.ESCAPED
+            code[todo], last[todo], speed[todo] = now, motion.z, motion.velocity
+            keep = np.flatnonzero(now == Outcome.OPEN)
+            motion, todo = motion.take(keep), todo[keep]
+            if len(todo) == 0:
+                break
+        motion, found = motion.step(structure, launches.p[todo], clock.step, clock.rate)
+        code[todo[~found]] = Outcome.LOST
+        keep = np.flatnonzero(found)
+        motion, todo = motion.take(keep), todo[keep]
+    return Outcomes(code, last, speed)
+
+
+def _away(structure: Structure, z: Lanes, launches: Launches) -> tuple[Flags, Flags]:
+    """Whether the flow leads elsewhere from configurations, and whether it fails."""
+    ends, landed = relax(structure, z, launches.p)
+    gap = metric_length(structure, (ends - launches.home)[:, : structure.unknowns])
+    return landed & (gap > SAME_SOLUTION), ~landed
+
+
+def relax(structure: Structure, z: Lanes, p: Parameters) -> tuple[Lanes, Flags]:
+    """Where the gradient flow leads from configurations, and whether that is a stable state."""
+    if len(z) == 0:
+        return z, np.zeros(0, bool)
+    soft = soft_modes(structure, z, p)
+    flow = gradient_flow(structure, z, p, soft.stiffness, soft.length)
+    return flow.z, flow.code == Ending.LANDED
