@@ -10,6 +10,8 @@ from equimorph.array_types import Bool, Float, Int
 # one row for each lane of a batch
 Lanes = Float[np.ndarray, "lanes size"]
 """Unknowns and multipliers z = (u, λ) of each lane."""
+Velocity = Float[np.ndarray, "lanes unknowns"]
+"""Rates of the unknowns u of each lane."""
 Parameters = Float[np.ndarray, "lanes parameters"]
 """All parameters p of the structure, in its order, for each lane."""
 Values = Float[np.ndarray, " lanes"]

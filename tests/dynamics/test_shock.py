@@ -4,13 +4,12 @@ import numpy as np
 import pytest
 
 import equimorph as em
-from equimorph.dynamics.model import landing
 from equimorph.dynamics.outcomes import Clock, Launches, Outcome, play
+from equimorph.dynamics.pushes import least_force
 from equimorph.dynamics.time_steps import Motion
 from equimorph.errors import InputError
 from equimorph.structures.contract import Structure
 from equimorph.structures.pushed import Pushed
-from equimorph.tolerances import SAME_SOLUTION
 
 MASS = 2.0
 QUICK = em.ReplaySettings(step=0.05)
@@ -52,6 +51,7 @@ def test_the_least_impulse_of_a_double_well_is_that_of_its_damped_separatrix(wel
     assert seen.code.tolist() == [Outcome.HELD, Outcome.LEFT]
 
 
+@pytest.mark.slow
 def test_no_smaller_impulse_can_and_a_slow_force_snaps_at_the_fold():
     """Bounds √(2 m ΔE); limit load (1 − x_l^⅔)^(3/2) of the spring, downwards only."""
     spring = em.Spring()
@@ -67,6 +67,17 @@ def test_no_smaller_impulse_can_and_a_slow_force_snaps_at_the_fold():
     assert force.landing.z[0] == pytest.approx(-np.arccos(0.8))
     assert shock.push[-1] == pytest.approx([0.0, -0.6])
     assert "point force" in repr(shock)
+
+
+@pytest.mark.parametrize("x_l", [0.7, 0.9])
+def test_the_least_slow_force_is_the_limit_load(x_l):
+    """(1 − x_l^⅔)^(3/2), downwards only, from a force that the spring has no parameter for."""
+    spring = em.Spring()
+    start = spring.natural_state(x_l=x_l)
+    barrier = em.transition_network(spring, start.parameters).barrier(start)
+    force = least_force(start, barrier, spring.height)
+    assert force.value == pytest.approx(-((1.0 - x_l ** (2 / 3)) ** 1.5), abs=1e-9)
+    assert (force.unit, force.landing.z[0]) == ("force", pytest.approx(-np.arccos(x_l)))
 
 
 @pytest.mark.slow
@@ -139,45 +150,3 @@ def test_states_without_a_barrier_have_no_shock_and_bad_ones_are_refused(well):
     still = em.Descriptor("still", "1", lambda z, p: np.zeros(len(z)))
     with pytest.raises(InputError, match="must move with the unknowns"):
         em.least_shock(start, at=still)
-
-
-@pytest.mark.slow
-def test_the_least_impulse_of_an_arch_is_confirmed_by_mujoco():
-    """Blows on the crown: below the bound a chain of rigid links stays, above the least it snaps.
-
-    The chain is damped in proportion to its stiffness, so that blunt blows lose more than by the
-    library's own equations; both have the same damping of the lowest mode.
-    """
-    pytest.importorskip("mujoco", reason="MuJoCo is not installed (extra `replay`)")
-    from equimorph.dynamics.simulators import model_of  # noqa: PLC0415
-    from equimorph.structures.vibration import vibrations  # noqa: PLC0415
-
-    arch = em.Rod()
-    start = em.lift(arch.natural_state(Theta=1.0), {"q": 2.5}).end.state
-    crown = arch.height(0.5)
-    used = em.ReplaySettings(step=0.04)
-    impulse = em.least_shock(start, at=crown, settings=used)["point impulse"]
-    slope = Pushed(arch, crown, 1.0, 1.0).gradient(start.z[None], np.append(start.p, 0.0)[None])[0]
-    modes = vibrations(arch, start.z[None], start.p[None], 6).modes[0]
-    rates = modes.T @ (modes @ slope)
-    model = model_of(start, "mujoco", 40)
-
-    def snaps(size):
-        plant = model.plant(start, 0.01, used.damping)
-        moved = np.zeros(arch.size)
-        moved[: arch.unknowns] = 1e-5 * rates
-        ahead, behind = (
-            model._chained.angles(em.State(arch, start.z + way, start.p)).ravel()
-            for way in (moved, -moved)
-        )
-        turning = size * (ahead - behind) / 2e-5
-        chain = plant._plant
-        chain.data.qvel[chain._hinge[: len(turning)]] = np.diff(turning, prepend=0.0)
-        for _ in range(3000):
-            plant.step()
-        rest = landing(arch, plant.guess(), start.p)
-        gap = np.sqrt(arch.mass @ (rest.z - start.z)[: arch.unknowns] ** 2)
-        return gap > SAME_SOLUTION
-
-    assert not snaps(-0.9 * impulse.bound)
-    assert snaps(1.25 * impulse.value)

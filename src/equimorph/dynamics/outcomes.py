@@ -6,7 +6,7 @@ from enum import IntEnum
 import numpy as np
 
 from equimorph.array_types import Int
-from equimorph.arrays import Flags, Lanes, Parameters, Values
+from equimorph.arrays import Flags, Lanes, Parameters, Values, Velocity
 from equimorph.columns import Columns
 from equimorph.dynamics.time_steps import Motion
 from equimorph.equilibria.gradient_flow import Ending, gradient_flow
@@ -49,7 +49,7 @@ class Launches(Columns):
 
     z: Lanes
     p: Parameters
-    velocity: Lanes
+    velocity: Velocity
     home: Lanes
     level: Values
 
@@ -80,7 +80,7 @@ class Outcomes:
 
     code: Int[np.ndarray, " lanes"]
     z: Lanes
-    velocity: Lanes
+    velocity: Velocity
 
 
 def play(structure: Structure, launches: Launches, clock: Clock, *, watch: bool) -> Outcomes:

@@ -57,12 +57,12 @@ class OwnPlant(DirectPlant):
     @property
     def z(self) -> Float[np.ndarray, " size"]:
         """Unknowns and multipliers."""
-        return self._motion.z[0]
+        return np.asarray(self._motion.z[0])
 
     @property
     def velocity(self) -> Float[np.ndarray, " unknowns"]:
         """Rates of the unknowns."""
-        return self._motion.velocity[0]
+        return np.asarray(self._motion.velocity[0])
 
     @property
     def speed(self) -> float:

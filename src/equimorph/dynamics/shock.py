@@ -232,9 +232,7 @@ class _Trial:
         """The state with multiples of velocities."""
         many = np.ones((len(sizes), 1))
         home, level = many * self.state.z, np.full(len(sizes), self.level)
-        return Launches(
-            home.copy(), many * self.state.p, sizes[:, None] * velocity, home, level
-        )
+        return Launches(home.copy(), many * self.state.p, sizes[:, None] * velocity, home, level)
 
     def _impulse(self, velocity: np.ndarray) -> tuple[_Sizes, float]:
         """Impulses in units of the one that gives a velocity, from the bound on; its energy."""
@@ -282,9 +280,7 @@ class _Trial:
         def launch(sizes: Values) -> Launches:
             many = np.repeat(np.arange(len(known)), len(sizes))
             shares = np.tile(sizes, len(known))
-            target = {
-                name: state[name] + shares * change for name, change in changes.items()
-            }
+            target = {name: state[name] + shares * change for name, change in changes.items()}
             led = lift(States(structure, known.z[many], known.p[many]), target)
             there = led.arrived.reshape(len(known), -1)
             energy = structure.energy(led.states.z, led.states.p).reshape(len(known), -1)
@@ -313,9 +309,7 @@ class _Trial:
         larger = replace(sizes, first=abs(found.value))
         return replace(self._search(kind, larger, signs, watch=False), bound=found.bound)
 
-    def _search(
-        self, kind: Kind, sizes: _Sizes, signs: tuple[int, ...], *, watch: bool
-    ) -> Shock:
+    def _search(self, kind: Kind, sizes: _Sizes, signs: tuple[int, ...], *, watch: bool) -> Shock:
         """Least size that leaves the basin, or that ends elsewhere without `watch`."""
         grid = np.geomspace(sizes.first * (1.0 + NEARLY), sizes.last, TRIED)
         every = np.array(signs)[:, None] * grid
@@ -385,4 +379,4 @@ def _slope(state: State, along: Descriptor) -> Float[np.ndarray, " unknowns"]:
     slope = pushed.gradient(state.z[None], np.append(state.p, 0.0)[None])[0]
     if not np.abs(slope).any():
         raise InputError(f"`at` must move with the unknowns; got {along!r}, which does not.")
-    return slope
+    return np.asarray(slope)

@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from equimorph.array_types import Bool, Float
-from equimorph.arrays import Flags, Lanes, Parameters, Values
+from equimorph.arrays import Flags, Lanes, Parameters, Values, Velocity
 from equimorph.columns import Columns
 from equimorph.equilibria.soft_modes import metric_length
 from equimorph.structures import Structure
@@ -30,22 +30,22 @@ class Motion(Columns):
     """
 
     z: Lanes
-    velocity: Lanes
-    before: Lanes
+    velocity: Velocity
+    before: Velocity
     """Unknowns one step ago; not a number at the start."""
-    velocity_before: Lanes
+    velocity_before: Velocity
 
     @classmethod
-    def of(cls, z: Lanes, velocity: Lanes) -> "Motion":
+    def of(cls, z: Lanes, velocity: Velocity) -> "Motion":
         """At the start."""
         nothing = np.full_like(velocity, np.nan)
         return cls(z, velocity, nothing, nothing)
 
     @cached_property
     def _begun(self) -> Bool[np.ndarray, "lanes 1"]:
-        return np.isfinite(self.before[:, :1])
+        return np.asarray(np.isfinite(self.before[:, :1]))
 
-    def _before(self, now: Lanes, before: Lanes) -> Lanes:
+    def _before(self, now: Velocity, before: Velocity) -> Velocity:
         """What a difference quotient of the next value takes from the last ones, times h."""
         return np.where(self._begun, -2.0 * now + 0.5 * before, -now)
 
@@ -61,13 +61,12 @@ class Motion(Columns):
         faster = np.where(self._begun, 2.0 * self.velocity - self.velocity_before, self.velocity)
         mass = structure.inertia(ahead, p)
         gamma = structure.inertial_force(ahead, p, faster)
-        rest, rest_v = self._before(u, self.before), self._before(
-            self.velocity, self.velocity_before
+        rest, rest_v = (
+            self._before(u, self.before),
+            self._before(self.velocity, self.velocity_before),
         )
         heavy = mass * ((first / h) * (first / h + rate))[:, :, None]
-        force = gamma + _times(
-            mass, (first / h + rate) * rest / h + rest_v / h
-        )
+        force = gamma + _times(mass, (first / h + rate) * rest / h + rest_v / h)
         todo, found = np.arange(len(z)), np.zeros(len(z), bool)
         inverse, size = np.zeros((len(z), z.shape[1], z.shape[1])), np.full(len(z), np.inf)
         renew = np.ones(len(z), bool)
@@ -97,5 +96,7 @@ class Motion(Columns):
         return np.asarray(structure.energy(self.z, p) + kinetic)
 
 
-def _times(matrix: Float[np.ndarray, "lanes m m"], x: Float[np.ndarray, "lanes m"]) -> Lanes:
+def _times(
+    matrix: Float[np.ndarray, "lanes m m"], x: Float[np.ndarray, "lanes m"]
+) -> Float[np.ndarray, "lanes m"]:
     return np.asarray((matrix @ x[:, :, None])[:, :, 0])

@@ -15,7 +15,7 @@ import numpy as np
 
 from equimorph.argument_checks import check_arguments
 from equimorph.array_types import Float, Int
-from equimorph.arrays import Flags, Lanes, Parameters, Values
+from equimorph.arrays import Flags, Lanes, Parameters, Values, Velocity
 from equimorph.errors import InputError, MissingError, suggestion
 from equimorph.html_tables import html_table
 from equimorph.model import (
@@ -55,7 +55,6 @@ _CALL = re.compile(r"(\w+)(?:\(([\w,-]+)\))?")
 """Text of a descriptor: its name, and its arguments in parentheses if it has some."""
 Velocities = Float[np.ndarray, "lanes k unknowns"]
 Product = Callable[[Velocities], Velocities]
-Velocity = Float[np.ndarray, "lanes unknowns"]
 INERTIA_DIFFERENCE = 1e-5
 """Step of the unknowns in differences of the mass matrix."""
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from equimorph.array_types import Float
-from equimorph.arrays import Lanes, Parameters
+from equimorph.arrays import Lanes, Parameters, Velocity
 from equimorph.structures.equations import Equations
 
 STEP = 1e-3
@@ -38,7 +38,7 @@ class MaterialPoints:
             out[lane] = flat.T @ (weights[:, None] * flat)
         return out
 
-    def inertial_force(self, z: Lanes, p: Parameters, velocity: Lanes) -> Lanes:
+    def inertial_force(self, z: Lanes, p: Parameters, velocity: Velocity) -> Velocity:
         """``JᵀW D²x[u̇, u̇]``, with the second derivative of all places along the velocity."""
         out = np.zeros_like(velocity)
         for lane, rate in enumerate(velocity):

@@ -6,13 +6,15 @@ from typing import Any, ClassVar
 import numpy as np
 
 from equimorph.array_types import Float
-from equimorph.arrays import Flags, Lanes, Parameters, Sides, Values
+from equimorph.arrays import Flags, Lanes, Parameters, Sides, Values, Velocity
 from equimorph.errors import InputError
 from equimorph.linalg import BorderedSolution, no_border, solve_bordered
 from equimorph.model import Descriptor, Parameter
 from equimorph.structures.contract import Structure
 from equimorph.structures.dense import dense_matrices
 from equimorph.structures.equations import AnyBorder, Direction, Shift
+
+Shifts = Float[np.ndarray, "shifts unknowns"]
 
 PUSH = "push"
 """Name of the force, the last parameter."""
@@ -41,9 +43,7 @@ class Pushed(Structure):
 
     kind: ClassVar[str] = "pushed structure"
 
-    def __init__(
-        self, structure: Structure, along: Descriptor, scale: float, reach: float
-    ) -> None:
+    def __init__(self, structure: Structure, along: Descriptor, scale: float, reach: float) -> None:
         self._base, self._along, self._step = structure, along, DIFFERENCE * reach
         self.unknowns, self.constraints = structure.unknowns, structure.constraints
         self.mass, self.energy_scale = structure.mass, structure.energy_scale
@@ -62,14 +62,14 @@ class Pushed(Structure):
 
     # --- the descriptor -------------------------------------------------------------------------
 
-    def _values(self, z: Lanes, p: Parameters, shifts: Lanes) -> Float[np.ndarray, "lanes shifts"]:
+    def _values(self, z: Lanes, p: Parameters, shifts: Shifts) -> Float[np.ndarray, "lanes shifts"]:
         """S at all shifts of the unknowns."""
         at = np.repeat(z, len(shifts), axis=0)
         at[:, : self.unknowns] += np.tile(shifts, (len(z), 1))
         own = np.repeat(p[:, : len(self._base.parameters)], len(shifts), axis=0)
         return self._along.function(at, own).reshape(len(z), len(shifts))
 
-    def gradient(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes unknowns"]:
+    def gradient(self, z: Lanes, p: Parameters) -> Velocity:
         """∂S/∂u."""
         units = self._step * np.eye(self.unknowns)
         found = self._values(z, p, np.concatenate([units, -units, 2.0 * units, -2.0 * units]))
@@ -77,7 +77,7 @@ class Pushed(Structure):
         return np.asarray((8.0 * (ahead - behind) - (twice - back)) / (12.0 * self._step))
 
     @cached_property
-    def _pairs(self) -> tuple[Lanes, np.ndarray, np.ndarray]:
+    def _pairs(self) -> tuple[Shifts, np.ndarray, np.ndarray]:
         i, j = np.triu_indices(self.unknowns)
         units = self._step * np.eye(self.unknowns)
         both = units[i] + units[j]
@@ -97,13 +97,13 @@ class Pushed(Structure):
 
     # --- the contract ---------------------------------------------------------------------------
 
-    def _own(self, p: Parameters) -> Parameters:
+    def _own(self, p: Parameters) -> Float[np.ndarray, "lanes own"]:
         return np.ascontiguousarray(p[:, :-1])
 
     def energy(self, z: Lanes, p: Parameters) -> Values:
         """E − f S."""
         own = self._own(p)
-        return self._base.energy(z, own) - p[:, -1] * self._along.function(z, own)
+        return np.asarray(self._base.energy(z, own) - p[:, -1] * self._along.function(z, own))
 
     def effort(self, z: Lanes, p: Parameters) -> Parameters:
         """Those of the structure, and −S."""

@@ -8,7 +8,7 @@ import numpy as np
 from equimorph.argument_checks import check_arguments
 from equimorph.argument_vocabulary import count
 from equimorph.array_types import Float
-from equimorph.arrays import Lanes, Parameters
+from equimorph.arrays import Lanes, Parameters, Velocity
 from equimorph.structures.contract import Symmetry
 from equimorph.structures.frame.described import DescribedFrame
 from equimorph.structures.frame.inertia import frame_material, member_masses
@@ -120,7 +120,7 @@ class Frame(DescribedFrame):
             return super().inertia(z, p)
         return frame_material(self, masses).inertia(z, p)
 
-    def inertial_force(self, z: Lanes, p: Parameters, velocity: Lanes) -> Lanes:
+    def inertial_force(self, z: Lanes, p: Parameters, velocity: Velocity) -> Velocity:
         """Forces of inertia of the members at constant rates of the unknowns."""
         masses = member_masses(self.model)
         if masses is None:

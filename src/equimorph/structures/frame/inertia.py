@@ -25,9 +25,7 @@ def member_masses(model: FrameModel) -> Float[np.ndarray, " members"] | None:
     return np.array(found)
 
 
-def frame_material(
-    frame: FrameFields, masses: Float[np.ndarray, " members"]
-) -> MaterialPoints:
+def frame_material(frame: FrameFields, masses: Float[np.ndarray, " members"]) -> MaterialPoints:
     """Members that are as heavy everywhere, in units of the frame's energy."""
     model = frame.model
 

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from equimorph.array_types import Float
-from equimorph.arrays import Lanes, Nodal, Parameters, Sides, Values
+from equimorph.arrays import Lanes, Nodal, Parameters, Sides, Values, Velocity
 from equimorph.linalg import BorderedSolution, CondensedLayout, multiply, no_border
 from equimorph.linalg.intervals import Interval, cosine, join, product, sine
 from equimorph.linalg.lanes import over_lanes
@@ -163,7 +163,7 @@ class ClampedMechanics(PlanarMechanics):
         """JᵀWJ of the inner nodes' angles."""
         return inextensible_inertia(self.mesh, self.nodal_angles(z, p))[:, 1:-1, 1:-1]
 
-    def inertial_force(self, z: Lanes, p: Parameters, velocity: Lanes) -> Lanes:
+    def inertial_force(self, z: Lanes, p: Parameters, velocity: Velocity) -> Velocity:
         """Γ of the inner nodes' angles."""
         rates = np.pad(velocity, ((0, 0), (1, 1)))
         return inextensible_force(self.mesh, self.nodal_angles(z, p), rates)[:, 1:-1]

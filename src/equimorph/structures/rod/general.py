@@ -5,7 +5,7 @@ from functools import cached_property
 import numpy as np
 
 from equimorph.array_types import Float
-from equimorph.arrays import Flags, Lanes, Nodal, Parameters, Scalars, Sides, Values
+from equimorph.arrays import Flags, Lanes, Nodal, Parameters, Scalars, Sides, Values, Velocity
 from equimorph.linalg import BorderedSolution, CondensedLayout, no_border
 from equimorph.linalg.lanes import over_lanes
 from equimorph.linalg.sparse import SparseLayout
@@ -203,7 +203,7 @@ class GeneralMechanics(JointEquations, PlanarMechanics):
         moved = self._moved_places(z, p, self._following(z, p))
         return np.asarray(moved.transpose(0, 2, 1) @ (self._place_weights[:, None] * moved))
 
-    def inertial_force(self, z: Lanes, p: Parameters, velocity: Lanes) -> Lanes:
+    def inertial_force(self, z: Lanes, p: Parameters, velocity: Velocity) -> Velocity:
         """JᵀW D²x[u̇, u̇] of the unknown angles, by central differences of J."""
         follow = self._following(z, p)
         along = np.concatenate([velocity, np.einsum("lcu,lu->lc", follow, velocity)], axis=1)

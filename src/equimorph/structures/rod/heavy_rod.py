@@ -5,7 +5,7 @@ from abc import abstractmethod
 import numpy as np
 
 from equimorph.array_types import Float
-from equimorph.arrays import Lanes, Parameters
+from equimorph.arrays import Lanes, Parameters, Velocity
 from equimorph.model import Parameter
 from equimorph.structures.contract import Structure
 from equimorph.structures.rod.units import Units
@@ -23,7 +23,7 @@ class HeavyRod(Structure):
         """Physical mass matrix of a rod of mass 1, in units of its mass and length."""
 
     @abstractmethod
-    def inertial_force_in_lengths(self, z: Lanes, p: Parameters, velocity: Lanes) -> Lanes:
+    def inertial_force_in_lengths(self, z: Lanes, p: Parameters, velocity: Velocity) -> Velocity:
         """Γ of a rod of mass 1, see `Structure.inertial_force`, in units of its mass and length."""
 
     @property
@@ -52,7 +52,7 @@ class HeavyRod(Structure):
             return super().inertia(z, p)
         return unit**2 * self.inertia_in_lengths(z, p)
 
-    def inertial_force(self, z: Lanes, p: Parameters, velocity: Lanes) -> Lanes:
+    def inertial_force(self, z: Lanes, p: Parameters, velocity: Velocity) -> Velocity:
         """Forces of inertia at constant rates of the unknowns."""
         unit = self.units.time()
         if unit is None:

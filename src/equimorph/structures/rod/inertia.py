@@ -91,7 +91,9 @@ def following(
     return np.asarray(-np.linalg.pinv(trailing, rcond=RANK, hermitian=True) @ gradients)
 
 
-def moved_places(columns: tuple[Turns, Pulls], follow: Float[np.ndarray, "lanes m unknowns"], unknown: slice) -> Places:
+def moved_places(
+    columns: tuple[Turns, Pulls], follow: Float[np.ndarray, "lanes m unknowns"], unknown: slice
+) -> Places:
     """Derivatives of all places, one after the other, by the unknown angles."""
     angular, forced = columns
     moved = angular[:, :, :, unknown]

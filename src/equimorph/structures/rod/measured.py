@@ -3,7 +3,7 @@
 import numpy as np
 
 from equimorph.array_types import Float
-from equimorph.arrays import Lanes, Parameters, Values
+from equimorph.arrays import Lanes, Parameters, Values, Velocity
 from equimorph.structures.rod.any_rod import AnyRod, Arclengths
 from equimorph.structures.rod.centreline import Centreline
 from equimorph.structures.rod.mechanics import PlanarMechanics
@@ -42,7 +42,7 @@ class Measured(AnyRod):
         """Mass matrix of a rod of mass 1."""
         return self.mechanics.inertia(z, p)
 
-    def inertial_force_in_lengths(self, z: Lanes, p: Parameters, velocity: Lanes) -> Lanes:
+    def inertial_force_in_lengths(self, z: Lanes, p: Parameters, velocity: Velocity) -> Velocity:
         """Γ of a rod of mass 1."""
         return self.mechanics.inertial_force(z, p, velocity)
 

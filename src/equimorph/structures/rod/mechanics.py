@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from equimorph.array_types import Float
-from equimorph.arrays import Flags, Lanes, Nodal, Parameters, Values
+from equimorph.arrays import Flags, Lanes, Nodal, Parameters, Values, Velocity
 from equimorph.errors import InputError
 from equimorph.linalg.condensed import PIVOT_GUARD
 from equimorph.linalg.lanes import over_lanes
@@ -126,7 +126,7 @@ class PlanarMechanics(RodMechanics):
         """Physical mass matrix JᵀWJ of a rod of total mass 1, in units of L and of its mass."""
 
     @abstractmethod
-    def inertial_force(self, z: Lanes, p: Parameters, velocity: Lanes) -> Lanes:
+    def inertial_force(self, z: Lanes, p: Parameters, velocity: Velocity) -> Velocity:
         """Γ of a rod of total mass 1, see `Structure.inertial_force`, in units of L."""
 
     @property

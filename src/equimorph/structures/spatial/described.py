@@ -7,7 +7,7 @@ import numpy as np
 
 from equimorph.argument_checks import check_arguments
 from equimorph.array_types import Float
-from equimorph.arrays import Lanes, Parameters, Values
+from equimorph.arrays import Lanes, Parameters, Values, Velocity
 from equimorph.errors import InputError
 from equimorph.model import Descriptor, remember_call
 from equimorph.structures.places_inertia import MaterialPoints
@@ -81,7 +81,7 @@ class DescribedInSpace(AnyRod):
         """Mass matrix of a rod of mass 1: masses at the nodes of the elements."""
         return self._material.inertia(z, p)
 
-    def inertial_force_in_lengths(self, z: Lanes, p: Parameters, velocity: Lanes) -> Lanes:
+    def inertial_force_in_lengths(self, z: Lanes, p: Parameters, velocity: Velocity) -> Velocity:
         """Γ of the same masses."""
         return self._material.inertial_force(z, p, velocity)
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from equimorph.argument_checks import check_arguments
 from equimorph.array_types import Float
-from equimorph.arrays import Lanes, Parameters, Values
+from equimorph.arrays import Lanes, Parameters, Values, Velocity
 from equimorph.errors import InputError
 from equimorph.model import Constraint, Descriptor, remember_call
 from equimorph.structures.contract import Product, Symmetry
@@ -160,7 +160,7 @@ class Truss(TrussMechanics):
             return super().inertia_product(z, p)
         return lambda v: np.asarray(self._nodal_masses * v)
 
-    def inertial_force(self, z: Lanes, p: Parameters, velocity: Lanes) -> Lanes:
+    def inertial_force(self, z: Lanes, p: Parameters, velocity: Velocity) -> Velocity:
         """Zero: the mass matrix is constant."""
         del z, p
         return np.zeros_like(velocity)
