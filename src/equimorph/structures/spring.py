@@ -27,6 +27,7 @@ from equimorph.structures.states import State, natural_state
 EFFORTS = {"natural length": "force", "k": "length", "force/length": "length²"}
 """Units of efforts by those of their parameters."""
 
+
 @check_arguments
 class Spring(Structure):
     """Spring of natural length 1 from A = (x_l, 0) to B on the line x = 0, force F on B.
