@@ -59,9 +59,9 @@ class Interval:
         return widen(Interval(middle - reach, middle + reach))
 
     @staticmethod
-    def hull(one: Array, other: Array) -> "Interval":
-        """Values between two."""
-        return Interval(np.minimum(one, other), np.maximum(one, other))
+    def union(one: "Interval", other: "Interval") -> "Interval":
+        """Least intervals that hold two."""
+        return Interval(np.minimum(one.low, other.low), np.maximum(one.high, other.high))
 
     @staticmethod
     def zeros(*shape: int) -> "Interval":

@@ -4,7 +4,9 @@ On a segment p(t) the chord z̄(t) between two equilibria is compared with Newto
 T(z) = z − A F(z; p(t)), A about the inverse of F_z at the middle. With ‖T(z̄) − z̄‖ ≤ Y on the chord
 and ‖I − A F_z‖ ≤ Z < 1 in a tube around it, one equilibrium lies within r = Y/(1 − Z) of the chord
 for every t, if the tube is wider, and none else in the tube; as no F_z in it is singular, F_z keeps
-its inertia [DayLessardMischaikow2007]_. The same holds for all parameters within radii of p(t).
+its inertia [DayLessardMischaikow2007]_.
+With errors the chord becomes a box of chords z̄(t) + Z(t) ε, p(t) + P ε, |ε| ≤ 1, with the linear
+responses Z at the ends: every chord is straight for itself, so that the same bounds hold for all.
 All bounds are componentwise, in the maximum norm with weights s, so that they hold in z as it is.
 
 F, F_z and F_p are enclosed over boxes with outward rounding, and so is all that follows from them,
@@ -21,7 +23,7 @@ from equimorph.arrays import Flags, Lanes, Parameters, Values
 from equimorph.columns import Columns
 from equimorph.linalg.intervals import MORE, Interval, product
 from equimorph.structures import Enclosed, States, Structure
-from equimorph.tasks.verification.sampled_bounds import sampled_enclosure
+from equimorph.tasks.verification.error_box import ErrorBox, Responses, enclose
 
 Matrices = Float[np.ndarray, "lanes size size"]
 
@@ -51,60 +53,66 @@ class Bounds(Columns):
         Distance within which they are the only ones.
     at_ends
         Distance of the equilibria from the given states at both ends.
+    stable
+        Whether the index is 0 all along.
     weights
         s: entry by entry, z lies within r s of the chord.
     margin
-        Stability margin that is kept all along, 0 if none was proved. A margin above 0 says that
-        the index is 0 all along.
+        Stability margin that is kept all along, 0 if none was proved.
     """
 
     proved: Flags
     error: Values
     unique: Values
     at_ends: Float[np.ndarray, "lanes 2"]
+    stable: Flags
     weights: Lanes
     margin: Values
 
 
 def segment_bounds(
-    first: States, last: States, target: float = 0.0, radii: Parameters | None = None
+    first: States, last: States, target: float | None = 0.0, errors: ErrorBox | None = None
 ) -> Bounds:
-    """Bounds on the segments between pairs of equilibria; the `target` margin is tried as well.
+    """Bounds on the segments between pairs of equilibria, for all errors in a box around them.
 
-    With `radii` ≥ 0 they hold for all parameters within these distances of the segments; with the
-    same states first and last, for boxes of parameters.
+    The `target` margin is tried as well; None: no margin is sought, beyond the index 0. With the
+    same states first and last the bounds are those of boxes of parameters.
     """
     structure = first.structure
-    room = np.zeros_like(first.p) if radii is None else radii
+    box = errors or ErrorBox.none(first)
     with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
         amid = (Interval.at(0.5 * (one + other)) for one, other in _pairs(first, last))
-        inverse = spectral_inverse(enclose(structure, *amid).matrix.middle)[0]
-        chord, way = (Interval.hull(one, other) for one, other in _pairs(first, last))
-        way = way + Interval(-room, room)
-        near = enclose(structure, chord, way)
+        inverse = spectral_inverse(box.enclose(structure, *amid).matrix.middle)[0]
+        turns = [box.responses(each) for each in (first, last)]
+        boxes = [_around(each, turn, box) for each, turn in zip((first, last), turns, strict=True)]
+        chord, way = (Interval.union(*each) for each in zip(*boxes, strict=True))
+        near = box.enclose(structure, chord, way)
         weights = _weights(inverse, near.matrix.radius)
-        steering = apply(product(inverse, near.columns).size, room)
-        ends = [_defect(each, inverse) + steering for each in (first, last)]
-        defect = _norm(np.maximum(*ends) + _sag(first, last, inverse, near), weights)
+        given = zip((first, last), boxes, turns, strict=True)
+        ends = [_defect(inverse, box, *each) for each in given]
+        dz = (Interval.at(last.z) - first.z).size + MORE * np.abs(turns[1] - turns[0]).sum(axis=1)
+        sag = _sag(inverse, near, dz, (Interval.at(last.p) - first.p).size)
+        defect = _norm(np.maximum(*ends) + sag, weights)
         reach = ROOM * defect + LEAST_REACH
         tube = reach[:, None] * weights
-        matrix = enclose(structure, chord + Interval(-tube, tube), way).matrix
+        matrix = box.enclose(structure, chord + Interval(-tube, tube), way).matrix
         left = 1.0 - contraction(inverse, matrix, weights)
         error = MORE * defect / left
         proved = (left > 0.0) & (error <= reach) & np.isfinite(error)
         at_ends = np.stack([MORE * _norm(each, weights) / left for each in ends], axis=1)
-        least = np.where(proved, np.minimum(first.margin, last.margin), 0.0)
-        margin = _margins(structure, matrix, least, target)
-    return Bounds(proved, error, np.where(left > 0.0, reach, 0.0), at_ends, weights, margin)
+        stable, margin = _margins(structure, matrix, first, last, proved, target)
+    unique = np.where(left > 0.0, reach, 0.0)
+    return Bounds(proved, error, unique, at_ends, stable, weights, margin)
 
 
 def _pairs(first: States, last: States) -> tuple[tuple[Lanes, Lanes], ...]:
     return (first.z, last.z), (first.p, last.p)
 
 
-def enclose(structure: Structure, z: Interval, p: Interval) -> Enclosed:
-    """F and its derivatives over boxes: enclosed, or sampled where the structure has no bounds."""
-    return structure.enclosure(z, p) or sampled_enclosure(structure, z, p)
+def _around(states: States, turns: Responses, box: ErrorBox) -> tuple[Interval, Interval]:
+    """Boxes of the states and parameters that errors lead to."""
+    reach = np.abs(turns).sum(axis=1) * MORE
+    return Interval.around(states.z, reach), Interval.around(states.p, box.widths * MORE)
 
 
 def spectral_inverse(matrix: Matrices) -> tuple[Matrices, Matrices]:
@@ -142,30 +150,53 @@ def _weights(inverse: Matrices, radius: Matrices) -> Lanes:
     return np.asarray(weights)
 
 
-def _defect(end: States, inverse: Matrices) -> Lanes:
-    """|A F| at given states."""
-    found = enclose(end.structure, Interval.at(end.z), Interval.at(end.p)).residual
-    return product(inverse, found[:, :, None])[:, :, 0].size
+def _defect(
+    inverse: Matrices,
+    box: ErrorBox,
+    end: States,
+    around: tuple[Interval, Interval],
+    turns: Responses,
+) -> Lanes:
+    """|A F| at given states, with what their linear responses to the errors leave."""
+    structure = end.structure
+    found = enclose(structure, Interval.at(end.z), Interval.at(end.p)).residual
+    defect = product(inverse, found[:, :, None])[:, :, 0].size
+    if turns.shape[1]:
+        rest = box.remainder(box.enclose(structure, *around), turns).transpose(0, 2, 1)
+        defect = defect + product(inverse, rest).size.sum(axis=2)
+    return defect * MORE
 
 
-def _sag(first: States, last: States, inverse: Matrices, near: Enclosed) -> Lanes:
-    """Largest departure of A F from its chord between the ends.
+def _sag(inverse: Matrices, near: Enclosed, dz: Lanes, dp: Parameters) -> Lanes:
+    """Largest departure of A F from its chord between the ends, dz and dp apart.
 
     Its slope along the chord stays within ρ of a constant, so that it leaves its own chord by no
     more than ρ/2.
     """
-    dz, dp = ((Interval.at(other) - one).size for one, other in _pairs(first, last))
-    change = apply(near.matrix.radius, dz) + apply(near.columns.radius, dp)
+    moved = near.columns.radius[:, :, : dp.shape[1]]
+    change = apply(near.matrix.radius, dz) + apply(moved, dp)
     return 0.5 * MORE * apply(np.abs(inverse), change)
 
 
-def _margins(structure: Structure, matrix: Interval, least: Values, target: float) -> Values:
-    """Largest tried σ for which F_z − σ·mass keeps index 0 in the tubes.
+def _margins(
+    structure: Structure,
+    matrix: Interval,
+    first: States,
+    last: States,
+    proved: Flags,
+    target: float | None,
+) -> tuple[Flags, Values]:
+    """Whether F_z keeps index 0 in the tubes; the largest tried σ for which F_z − σ·mass does.
 
     Fractions of the smaller margin of the ends are tried; where the demanded margin lies between
     the best fraction and the smaller margin, also the demanded one.
     """
-    kept = np.zeros(len(least))
+    kept = np.zeros(len(proved))
+    if target is None:
+        stable = proved.copy()
+        stable[proved] = keeps_margin(structure, matrix[proved], kept[proved])
+        return stable, kept
+    least = np.where(proved, np.minimum(first.margin, last.margin), 0.0)
     for share in SHARES:
         todo = np.flatnonzero((kept == 0.0) & (least > 0.0))
         shift = share * least[todo]
@@ -173,7 +204,7 @@ def _margins(structure: Structure, matrix: Interval, least: Values, target: floa
     near = np.flatnonzero((kept < target) & (least > target))
     good = keeps_margin(structure, matrix[near], np.full(len(near), target))
     kept[near[good]] = target
-    return kept
+    return kept > 0.0, kept
 
 
 def keeps_margin(structure: Structure, matrix: Interval, margin: Values) -> Flags:

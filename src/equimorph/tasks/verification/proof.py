@@ -1,5 +1,6 @@
 """Proof mode: between the states of a schedule, too, the lifted curve exists and is unique."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Literal
@@ -97,7 +98,7 @@ def prove(states: States, margin: float = 0.0) -> Proof:
     tables of numbers that it computes with.
     """
     structure = states.structure
-    kind = _kind(states)
+    kind = kind_of_bounds(states)
     if kind == "unknown":
         why = (
             f"a {structure.kind} with {structure.size} unknowns knows no bounds of its "
@@ -123,7 +124,8 @@ def prove(states: States, margin: float = 0.0) -> Proof:
     return Proof(why, states, _errors(bounds), 0.0, kind, states[k : k + 2])
 
 
-def _kind(states: States) -> Literal["enclosed", "sampled", "unknown"]:
+def kind_of_bounds(states: States) -> Literal["enclosed", "sampled", "unknown"]:
+    """How F and its derivatives are bounded; "unknown": not at all."""
     structure = states.structure
     if structure.enclosure(Interval.at(states.z[:1]), Interval.at(states.p[:1])) is not None:
         return "enclosed"
@@ -136,16 +138,17 @@ def _without_repeats(states: States) -> States:
 
 
 def _all_bounds(first: States, last: States, margin: float) -> Bounds:
-    structure = first.structure
+    return bounds_in_parts(first, lambda rows: segment_bounds(first[rows], last[rows], margin))
+
+
+def bounds_in_parts(states: States, part: Callable[[slice], Bounds]) -> Bounds:
+    """Bounds of many segments, a part at a time, as their matrices take much memory."""
+    structure = states.structure
     entries = structure.size**2
-    if _kind(first) == "sampled":
+    if kind_of_bounds(states) == "sampled":
         entries *= structure.size
     count = max(1, ENTRIES_AT_ONCE // entries)
-    parts = [
-        segment_bounds(first[k : k + count], last[k : k + count], margin)
-        for k in range(0, len(first), count)
-    ]
-    return Bounds.concatenate(parts)
+    return Bounds.concatenate([part(slice(k, k + count)) for k in range(0, len(states), count)])
 
 
 def _wrong(bounds: Bounds, margin: float) -> Bool[np.ndarray, " segments"]:

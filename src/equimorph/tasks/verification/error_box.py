@@ -1,0 +1,119 @@
+"""Boxes of errors around the segments of a proof: in parameters, and in data of the structure.
+
+An error ε ∈ [−1, 1]ᵐ shifts the parameters by ``P ε`` and F by ``Σ xₖ Gₖ``, x a part of ε; states
+follow by ``Z ε`` to first order, ``Z = −F_z⁻¹ (F_p P + G)``. The errors x of data count as further
+parameters of F.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from equimorph.array_types import Float
+from equimorph.arrays import Lanes, Parameters
+from equimorph.columns import Columns
+from equimorph.linalg.intervals import Interval, join, product
+from equimorph.structures import Enclosed, States, Structure
+from equimorph.tasks.verification.sampled_bounds import sampled_enclosure
+
+Responses = Float[np.ndarray, "lanes m size"]
+
+
+def enclose(structure: Structure, z: Interval, p: Interval) -> Enclosed:
+    """F and its derivatives over boxes: enclosed, or sampled where the structure has no bounds."""
+    return structure.enclosure(z, p) or sampled_enclosure(structure, z, p)
+
+
+@dataclass(frozen=True)
+class Deviation:
+    """Change ``x G`` of F by an error of data, |x| ≤ 1: F is linear in x.
+
+    Parameters
+    ----------
+    nominal
+        The structure without errors.
+    changed
+        The one at x = 1: G is the difference of their F.
+    far
+        One at a large x, from which bounds of G and its derivatives are narrow.
+    multiple
+        That x.
+    """
+
+    nominal: Structure
+    changed: Structure
+    far: Structure
+    multiple: float
+
+    def force(self, z: Lanes, p: Parameters) -> Lanes:
+        """G."""
+        return np.asarray(self.changed.residual(z, p) - self.nominal.residual(z, p))
+
+    def enclose(self, z: Interval, p: Interval) -> Enclosed:
+        """G and its derivatives over boxes; G itself by its mean value."""
+        slopes = self._change(z, p)
+        here = self._change(Interval.at(z.middle), Interval.at(p.middle)).residual
+        rows = join([slopes.matrix, slopes.columns], 2)
+        room = rows.size @ np.concatenate([z.radius, p.radius], axis=1)[:, :, None]
+        return Enclosed(here + Interval(-room, room)[:, :, 0], slopes.matrix, slopes.columns)
+
+    def _change(self, z: Interval, p: Interval) -> Enclosed:
+        near, far = enclose(self.nominal, z, p), enclose(self.far, z, p)
+        pairs = [(getattr(near, name), getattr(far, name)) for name in vars(near)]
+        return Enclosed(*((there - here) / self.multiple for here, there in pairs))
+
+
+@dataclass(frozen=True)
+class ErrorBox(Columns):
+    """Errors of the parameters, which may differ from segment to segment, and of data.
+
+    Parameters
+    ----------
+    steps
+        Changes of all parameters by each error.
+    deviations
+        Errors of data.
+    """
+
+    steps: Float[np.ndarray, "lanes m parameters"]
+    deviations: tuple[Deviation, ...] = ()
+
+    @classmethod
+    def none(cls, states: States) -> "ErrorBox":
+        """No errors."""
+        return cls(np.zeros((len(states), 0, states.p.shape[1])))
+
+    def responses(self, states: States) -> Responses:
+        """Linear changes of states by each error of parameters, then of data."""
+        structure, z, p = states.structure, states.z, states.p
+        lanes, m = self.steps.shape[:2]
+        forces = [each.force(z, p) for each in self.deviations]
+        if m + len(forces) == 0:
+            return np.zeros((lanes, 0, structure.size))
+        steps = [np.ascontiguousarray(self.steps[:, k]) for k in range(m)]
+        columns = [structure.parameter_derivative(z, p, step) for step in steps]
+        return structure.solve(z, p, -np.stack([*columns, *forces], axis=1)).x
+
+    @property
+    def widths(self) -> Parameters:
+        """Half widths of the boxes of parameters."""
+        return np.asarray(np.abs(self.steps).sum(axis=1))
+
+    def enclose(self, structure: Structure, z: Interval, p: Interval) -> Enclosed:
+        """F and its derivatives over boxes, for all errors of data; these are the last columns."""
+        found, either = enclose(structure, z, p), Interval(-np.ones(1), np.ones(1))
+        matrix, columns, own = found.matrix, found.columns, []
+        for each in self.deviations:
+            change = each.enclose(z, p)
+            matrix, columns = matrix + either * change.matrix, columns + either * change.columns
+            own.append(change.residual[:, :, None])
+        return Enclosed(found.residual, matrix, join([columns, *own], 2))
+
+    def remainder(self, found: Enclosed, responses: Responses) -> Interval:
+        """F_z Z + F_p P + G over boxes: what the linear responses leave."""
+        lanes, m, _ = self.steps.shape
+        data = len(self.deviations)
+        steps = np.zeros((lanes, m + data, self.steps.shape[2] + data))
+        steps[:, :m, : self.steps.shape[2]] = self.steps
+        steps[:, range(m, m + data), range(self.steps.shape[2], steps.shape[2])] = 1.0
+        return product(responses, found.matrix) + product(steps, found.columns.transpose(0, 2, 1))
