@@ -191,10 +191,13 @@ def test_quasi_static_paths_of_the_arch_change_where_they_merge_with_folds_or_me
     for p in cut.p[~bounded][::7]:
         for theta, delta in p[:2] * (1.0 + np.array([[1e-3, 0.0], [-1e-3, 0.0]])):
             state = arch.natural_state(Theta=theta, Delta=delta)
+            arrives = arch.max_curvature(state) <= 20.0
             with unchecked():
-                path = em.lift(state, {"q": 2.5}, within=eset.constraints)
+                if arrives:
+                    path = em.lift(state, {"q": 2.5}, within=eset.constraints)
+                    arrives = path.end.kind == "arrived"
                 inside = chart.state(np.array([[theta, delta]])).inside
-            assert inside[0] == (path.end.kind == "arrived"), (theta, delta, path.end.kind)
+            assert inside[0] == arrives, (theta, delta)
 
 
 def test_wrong_reductions_are_refused(spring_set):

@@ -20,7 +20,8 @@ from equimorph.arrays import (
     VertexFlags,
 )
 from equimorph.charts.location import Cells, Found
-from equimorph.charts.rules import Changes, Choice
+from equimorph.charts.rules import Choice
+from equimorph.charts.score_changes import changes_by_score
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.complex.cuts import Ends, cut_between
 from equimorph.manifold.complex.edge_points import Places, on_edges
@@ -80,6 +81,19 @@ class Preference:
         np.minimum.at(best, both.point[:others], score[:others])
         alone = ~np.isfinite(best)
         return np.where(alone, -1.0, score[others:] - np.where(alone, 0.0, best))
+
+    def changes(self, start: States, stop: States) -> Float[np.ndarray, "lanes k"]:
+        """Shares of straight ways at which the choice may change; see `Changes`.
+
+        `start`, `stop`: the same states at both ends of the ways, not preferred and preferred.
+        """
+        choice, constraints = self.choice, self.cells.eset.constraints
+        if choice.changes is not None:
+            return choice.changes(start.p, stop.p - start.p)
+        if choice.score is None:
+            return np.zeros((len(start), 0))
+        both, _ = self._with_others(start.z, start.p)
+        return changes_by_score(choice.score, both, stop, constraints)
 
     def _with_others(self, z: Lanes, p: Parameters) -> tuple[Found, Points]:
         """Other states over the points of states, then these; and the points."""
@@ -221,9 +235,9 @@ def _locate_changes(
             break
         cuts = low[wide, None] + (high - low)[wide, None] * np.arange(PARTS + 1) / PARTS
         exact: ItemValues = np.full(len(wide), np.nan)
-        if preference.choice.changes is not None and number % GUESSES == 0:
+        if number % GUESSES == 0:
             span = cuts[:, [0, -1]]
-            exact = _enclose(cuts, way.changes(preference.choice.changes, wide, span, first[wide]))
+            exact = _enclose(cuts, way.changes(preference, wide, span, first[wide]))
         at, lanes = cuts[:, 1:-1], np.repeat(wide, PARTS - 1)
         z, p, good = way.states(lanes, at.ravel())
         same: ItemFlags = np.zeros(len(lanes), bool)
@@ -273,18 +287,20 @@ class _Straight:
         return np.isin(self.fabric.vertices.kinds[self.ends], (VertexKind.FOLD, VertexKind.CORNER))
 
     def changes(
-        self, changes: Changes, lanes: Items, span: Float[np.ndarray, "n 2"], first: ItemFlags
+        self, preference: Preference, lanes: Items, span: Float[np.ndarray, "n 2"], first: ItemFlags
     ) -> Float[np.ndarray, "n k"]:
-        """Shares at which a rule's choice changes between two shares of some edges.
+        """Shares at which the choice may change between two shares of some edges.
 
         `first`: at which of the two shares the states are preferred.
         """
         start, stop = np.where(first, span.T[::-1], span.T)
-        p = self.fabric.vertices.p[self.ends[lanes]]
-        toward = p[:, 1] - p[:, 0]
-        begin = p[:, 0] + start[:, None] * toward
-        found = changes(begin, (stop - start)[:, None] * toward)
-        return np.asarray(start[:, None] + found * (stop - start)[:, None])
+        ends = [self.states(lanes, share) for share in (start, stop)]
+        good = np.flatnonzero(ends[0][2] & ends[1][2])
+        structure = self.fabric.setting.structure
+        found = preference.changes(*(States(structure, z[good], p[good]) for z, p, _ in ends))
+        out = np.full((len(lanes), found.shape[1]), np.nan)
+        out[good] = start[good, None] + found * (stop - start)[good, None]
+        return out
 
     def states(self, lanes: Items, t: ItemValues) -> Solved:
         """States at shares t of some edges, their parameters, and whether they were found."""

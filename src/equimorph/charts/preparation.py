@@ -7,6 +7,7 @@ import numpy as np
 from equimorph.array_types import Bool, Float, Int
 from equimorph.arrays import Facets, ItemFlags, Items, Pairs, VertexNumbers
 from equimorph.manifold import EquilibriumSet
+from equimorph.manifold.complex.kept_tables import kept
 from equimorph.manifold.complex.marked_complex import Fabric, fabric_of
 from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.simplices import volumes
@@ -88,11 +89,15 @@ def add_cusp_vertices(fabric: Fabric) -> tuple[Fabric, Int[np.ndarray, " cusps"]
 
 def with_cusp_vertices(eset: EquilibriumSet) -> EquilibriumSet:
     """A set with vertices at its cusps; the set itself if it has none."""
-    if len(eset.names) != 2:
-        return eset
+    made = _with_cusps(eset) if len(eset.names) == 2 else None
+    return eset if made is None else made
+
+
+@kept
+def _with_cusps(eset: EquilibriumSet) -> EquilibriumSet | None:
     fabric, cusps = add_cusp_vertices(fabric_of(eset))
     if len(cusps) == 0:
-        return eset
+        return None
     nothing = np.zeros(len(fabric.vertices), bool)
     return part_of(eset, fabric, np.ones(len(fabric.cells), bool), nothing, 0)
 

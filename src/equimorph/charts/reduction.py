@@ -1,6 +1,6 @@
 """`reduce`: at most one preferred state over each point, with barriers and gaps.
 
-See docs/decisions.md, "Preferences are bisected, not modelled".
+See docs/decisions.md, "Preferences are asked, not modelled".
 """
 
 from collections.abc import Callable
@@ -134,8 +134,9 @@ def reduce(
     """Reduce a set to at most one preferred state over each point.
 
     Vertices over which another state is preferred are left out, and edges between preferred and
-    other vertices are cut where the preference changes: by bisection of the exact choice. The same
-    method locates ties of scores, ends of other sheets and ends of paths.
+    other vertices are cut where the preference changes: at ties of scores, ends of other sheets and
+    ends of paths, which Newton's method finds and the exact choice on both sides confirms. Edges
+    without such a place are bisected.
 
     Parameters
     ----------

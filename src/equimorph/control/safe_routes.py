@@ -10,6 +10,7 @@ from equimorph.arrays import Values
 from equimorph.control.likely import Bundles, LikelyLoads, moved, positions
 from equimorph.equilibria import TraceOptions
 from equimorph.manifold import EquilibriumSet, equilibrium_set
+from equimorph.manifold.complex.kept_tables import from_cache
 from equimorph.model import names_of
 from equimorph.structures import States
 from equimorph.tasks.planning.network import (
@@ -21,7 +22,6 @@ from equimorph.tasks.planning.network import (
 )
 from equimorph.tasks.planning.objectives import objective_of
 from equimorph.tasks.planning.straightening import CORNER, STATIONS_WITH_MARGINS, pairs_on_path
-from equimorph.tasks.stable_part import from_cache
 from equimorph.tasks.verification.schedule_check import follow_polyline
 
 MOST_INTERVALS = 20

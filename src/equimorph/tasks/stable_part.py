@@ -1,35 +1,23 @@
 """The stable part of an equilibrium set: vertices, edges, pieces; computed once for each set."""
 
-from collections.abc import Callable
 from itertools import combinations_with_replacement
-from typing import Any
-from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from equimorph.array_types import Bool, Float, Int
 from equimorph.manifold import EquilibriumSet, part, restricted
+from equimorph.manifold.complex.kept_tables import from_cache, kept
 from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.geometry.topology import faces_of
 from equimorph.manifold.queries.locate import cell_of, pieces_of
 from equimorph.model import Constraint, Descriptor
 from equimorph.structures import State
 
-_KEPT: WeakKeyDictionary[EquilibriumSet, dict[Any, Any]] = WeakKeyDictionary()
-
 SLACK = 1e-9
 """Relative excess over a bound that counts as none."""
 
 PARTS = 4
 """Parts of a side of a cell between the places whose distances are compared."""
-
-
-def from_cache(eset: EquilibriumSet, key: Any, compute: Callable[[], Any]) -> Any:
-    """Return what was computed before for a set, or compute it; forgotten with the set."""
-    known = _KEPT.setdefault(eset, {})
-    if key not in known:
-        known[key] = compute()
-    return known[key]
 
 
 def stable_values(eset: EquilibriumSet, descriptor: Descriptor) -> Float[np.ndarray, " V"]:
@@ -43,6 +31,7 @@ def stable_values(eset: EquilibriumSet, descriptor: Descriptor) -> Float[np.ndar
     return np.asarray(from_cache(eset, ("values", descriptor), compute))
 
 
+@kept
 def stable_vertices(eset: EquilibriumSet) -> Bool[np.ndarray, " V"]:
     """Vertices of stable cells, those on folds among them."""
     stable = np.zeros(len(eset.points), bool)
@@ -50,10 +39,10 @@ def stable_vertices(eset: EquilibriumSet) -> Bool[np.ndarray, " V"]:
     return stable
 
 
+@kept
 def stable_edges(eset: EquilibriumSet) -> Int[np.ndarray, "edges 2"]:
     """Edges of stable cells."""
-    found = from_cache(eset, "edges", lambda: faces_of(eset.cells[eset.cell_index == 0], 2))
-    return np.asarray(found)
+    return faces_of(eset.cells[eset.cell_index == 0], 2)
 
 
 def feasible_vertices(

@@ -15,6 +15,7 @@ from equimorph.array_types import Float
 from equimorph.arrays import ItemFlags, Items
 from equimorph.equilibria import settle
 from equimorph.manifold import EquilibriumSet
+from equimorph.manifold.complex.kept_tables import from_cache
 from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.queries.nearest import SetPoints, points_at_vertices
 from equimorph.model import Constraint
@@ -28,7 +29,7 @@ from equimorph.tasks.planning.filtration import Filtration
 from equimorph.tasks.planning.network import Ends
 from equimorph.tasks.planning.objectives import Extreme
 from equimorph.tasks.route import Bottleneck, BottleneckKind
-from equimorph.tasks.stable_part import cell_near, from_cache, stable_values
+from equimorph.tasks.stable_part import cell_near, stable_values
 from equimorph.tolerances import FEASIBLE, SAME_NUMBER
 
 ROUNDS = 40

@@ -16,12 +16,13 @@ from scipy.sparse.csgraph import breadth_first_order, minimum_spanning_tree
 from equimorph.array_types import Float
 from equimorph.arrays import Facets, Items, ItemValues, Pairs
 from equimorph.manifold import EquilibriumSet
+from equimorph.manifold.complex.kept_tables import from_cache
 from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.topology import adjacency
 from equimorph.model import Constraint
 from equimorph.tasks.optimising.programme import Branches, Objective, match_branches
 from equimorph.tasks.planning.network import walk_back
-from equimorph.tasks.stable_part import SLACK, from_cache, stable_values
+from equimorph.tasks.stable_part import SLACK, stable_values
 
 Shares = Float[np.ndarray, "n d"]
 

@@ -14,12 +14,12 @@ from equimorph.equilibria.soft_modes import metric_length
 from equimorph.equilibria.trace import Traces, trace
 from equimorph.equilibria.trace_options import EventCode
 from equimorph.manifold import EquilibriumSet
+from equimorph.manifold.complex.kept_tables import from_cache
 from equimorph.manifold.geometry.topology import faces_of
 from equimorph.model import Constraint, are_feasible, eased
 from equimorph.structures import State, States, Structure, join_states
 from equimorph.tasks.planning.objectives import ROUGH, Objective, Wish, objective_of
 from equimorph.tasks.route import FINE
-from equimorph.tasks.stable_part import from_cache
 
 EXACT, RESERVES = (1.0, 0.0), ((1.01, 1e-3), (1.05, 1e-2), (1.15, 1e-2))
 """Factors on the demanded margin, and shares of the smaller margin of the ends added to it."""

@@ -11,6 +11,7 @@ from scipy.sparse.csgraph import dijkstra
 from equimorph.array_types import Float, Int
 from equimorph.equilibria import Landing, Path, lift, snap_landing
 from equimorph.manifold import EquilibriumSet, Snap, snap_graph
+from equimorph.manifold.complex.kept_tables import from_cache
 from equimorph.model import Descriptor
 from equimorph.structures import State, States, join_states
 from equimorph.tasks.distances import distance
@@ -33,7 +34,6 @@ from equimorph.tasks.planning.straightening import (
     way_points_of,
 )
 from equimorph.tasks.route import FINE, Corners, Route, refusal, schedule_of
-from equimorph.tasks.stable_part import from_cache
 from equimorph.tolerances import SAME_STATE
 
 SAMPLES = 9

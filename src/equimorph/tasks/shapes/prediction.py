@@ -10,13 +10,13 @@ from equimorph.arrays import Rows, Some
 from equimorph.equilibria.point_conditions import Values
 from equimorph.equilibria.settle import Guards, Settled, embedded_planes, free_directions, settle
 from equimorph.manifold import EquilibriumSet
+from equimorph.manifold.complex.kept_tables import from_cache
 from equimorph.manifold.geometry.setting import Setting, embed
 from equimorph.manifold.geometry.tangents import split_step
 from equimorph.manifold.geometry.topology import faces_of
 from equimorph.manifold.queries.nearest import SetPoints
 from equimorph.model import Descriptor
 from equimorph.tasks.optimising.tangent_steps import unconstrained_setting
-from equimorph.tasks.stable_part import from_cache
 
 CLOSE = 0.5
 """Distance of two predictions, in sizes of their cell, below which one of them will do."""
