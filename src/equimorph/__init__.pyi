@@ -294,6 +294,10 @@ from .tasks.robustness.room import (
     stable_room as stable_room,
     Room as Room,
 )
+from .tasks.verification.box_proof import (
+    certify_box as certify_box,
+    BoxProof as BoxProof,
+)
 from .tasks.robustness.snaps import (
     least_snap as least_snap,
     LeastSnap as LeastSnap,
