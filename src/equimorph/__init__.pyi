@@ -298,6 +298,20 @@ from .tasks.verification.box_proof import (
     certify_box as certify_box,
     BoxProof as BoxProof,
 )
+from .tasks.robustness.erring import (
+    Errors as Errors,
+)
+from .tasks.robustness.survival import (
+    survival as survival,
+    survival_room as survival_room,
+    SurvivalRoom as SurvivalRoom,
+)
+from .tasks.robustness.evidence import (
+    Survival as Survival,
+)
+from .tasks.verification.tube import (
+    TubeProof as TubeProof,
+)
 from .tasks.robustness.snaps import (
     least_snap as least_snap,
     LeastSnap as LeastSnap,

@@ -60,6 +60,7 @@ RANGES: Mapping[str, Range] = {
     **dict.fromkeys(
         ("tolerances", "spreads", "offsets", "could_measure", "sizes", "limits", "errors"), POSITIVE
     ),
+    "survive": POSITIVE,
     **dict.fromkeys(("first_step", "largest_step", "smallest_step", "turning"), POSITIVE),
     **dict.fromkeys(("lower", "upper"), EXTENDED),
     **dict.fromkeys(("EI", "EI_out", "GJ", "EA", "E", "rest", "length"), POSITIVE),
@@ -68,7 +69,7 @@ RANGES: Mapping[str, Range] = {
     **dict.fromkeys(("accelerations", "jerks", "sampling"), POSITIVE),
     **dict.fromkeys(("width", "thickness", "diameter", "wall", "density", "weight"), POSITIVE),
     **dict.fromkeys(("s", "start", "stop"), SHARE),
-    "kinks": BETWEEN,
+    **dict.fromkeys(("kinks", "probability"), BETWEEN),
     "degree": count(3, 16),
     "margin": NOT_NEGATIVE,
     **dict.fromkeys(
@@ -117,6 +118,7 @@ CLASSES: Mapping[str, tuple[str, str]] = {
     "LimitLoadMap": ("a map of limit loads, like `limit_load_map(...)`", "maps of limit loads"),
     "LimitLoad": ("a limit load, like `limit_load(...)`", "limit loads"),
     "StateEstimate": ("an answer of `estimate_state`", "answers of `estimate_state`"),
+    "Errors": ('errors, like `Errors({"Theta": 0.02})`', "errors"),
     "Location": ("an answer of `locate`", "answers of `locate`"),
     "Route": ("a route, like `plan(...)`", "routes"),
     "Path": ("a path, like `lift(...)`", "paths"),

@@ -13,6 +13,7 @@ from equimorph.tables import units_of
 from equimorph.tasks.route import Route
 
 ABOUT, EVENTS, SCHEDULE, SNAPS, BOTTLENECK = "about", "events", "schedule", "snaps", "bottleneck"
+SURVIVAL = "survival"
 
 
 def write_route(group: h5py.Group, route: Route) -> None:
@@ -30,6 +31,8 @@ def write_route(group: h5py.Group, route: Route) -> None:
         write_value(group.create_group(SNAPS), route.snaps)
     if route.bottleneck is not None:
         write_value(group.create_group(BOTTLENECK), route.bottleneck)
+    if route.survival is not None:
+        write_value(group.create_group(SURVIVAL), route.survival)
 
 
 def read_route(group: h5py.Group, owner: Owner) -> Route:
@@ -47,6 +50,7 @@ def read_route(group: h5py.Group, owner: Owner) -> Route:
         schedule=_read_schedule(group[SCHEDULE]) if SCHEDULE in group else None,
         snaps=read_value(group[SNAPS], owner) if SNAPS in group else (),
         bottleneck=read_value(group[BOTTLENECK], owner) if BOTTLENECK in group else None,
+        survival=read_value(group[SURVIVAL], owner) if SURVIVAL in group else None,
     )
 
 

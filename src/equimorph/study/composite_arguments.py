@@ -23,6 +23,7 @@ from equimorph.study.lookup import (
 )
 from equimorph.study.states import StateSection
 from equimorph.tasks.maps.actuator_map import unloaded_base
+from equimorph.tasks.robustness.erring import ErringStructure, Errors
 from equimorph.tasks.start import check_schedule
 from equimorph.tasks.verification.schedule_check import first_state
 
@@ -112,6 +113,29 @@ class ObjectiveArgument(Argument):
             (weight, Rates(section.rates or {}) if name == "time" else name)
             for name, weight in terms.items()
         ]
+
+
+class ErrorsArgument(Argument):
+    """Errors that a way has to survive, and with which probability, if not all of a box."""
+
+    def keys(self) -> dict[str, tuple[Any, Any]]:
+        """Give the sizes, and the probability."""
+        share = Annotated[float, Field(gt=0.0, lt=1.0)] | None
+        return {self.key: (self.written | None, None), "probability": (share, None)}
+
+    def check(self, section: Any) -> None:
+        """A probability is one of some errors."""
+        if section.probability is not None and getattr(section, self.key) is None:
+            raise requirement(f"give {self.key} beside a probability")
+
+    def look_up(self, ground: Ground, section: Any, place: str) -> Any:
+        """Check names."""
+        sizes = getattr(section, self.key)
+        if sizes is None:
+            return None
+        with at_key(f"{place}.{self.key}"):
+            errors = Errors(sizes, section.probability)
+            return ErringStructure(ground.structure, errors).errors
 
 
 class RatesArgument(Argument):

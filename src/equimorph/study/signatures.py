@@ -44,6 +44,7 @@ from equimorph.study.fields import (
 )
 from equimorph.study.rules import RuleSection
 from equimorph.study.states import NaturalSection, StateSection
+from equimorph.tasks.robustness.erring import Errors
 
 MEANINGS: Mapping[str, Any] = {
     "margin": NotNegative,
@@ -74,6 +75,7 @@ MEANINGS: Mapping[str, Any] = {
     "offsets": dict[str, Positive],
     "spreads": dict[str, Positive],
     "tolerances": dict[str, Positive],
+    "survive": dict[str, Positive],
 }
 """What values may be, of parameters whose names mean the same in all tasks."""
 SUPPLIED = (EquilibriumSet, Structure, Progress, Journal, Workers)
@@ -142,6 +144,7 @@ SORTS: tuple[tuple[Callable[[Form], bool], Make, Any], ...] = (
     (lambda form: form.is_any(Schedule), composite.WayArgument, None),
     (lambda form: form.kinds == (Rates,), composite.RatesArgument, None),
     (lambda form: form.is_any(Rates), composite.ObjectiveArgument, composite.Objective),
+    (lambda form: form.is_any(Errors), composite.ErrorsArgument, None),
     (lambda form: form.is_any(Descriptor), given.DescriptorArgument, str),
     (lambda form: form.is_any(Box), given.BoxArgument, dict[str, Interval]),
     (lambda form: form.is_any(Grid), composite.GridArgument, None),

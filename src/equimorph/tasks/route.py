@@ -13,6 +13,7 @@ from equimorph.html_tables import html_table
 from equimorph.model import Constraint, Descriptor, Schedule, names_of
 from equimorph.structures import State, States, Structure
 from equimorph.tasks.distances import distance
+from equimorph.tasks.robustness.evidence import Survival
 from equimorph.tolerances import SAME_STATE
 
 FINE = TraceOptions(largest_step=0.02, first_step=0.01, turning=0.05, steps=20000)
@@ -65,8 +66,9 @@ class Route:
     at a finer step: `path`, its smallest stability `margin`, its `length` in the structure's metric
     and scaled parameters, what it was planned for (`objective`) and its `cost`, and the `schedule`
     for the actuators. Where snaps were allowed, `snaps` has their landings, in order; where a peak
-    was kept low, `bottleneck` has its exact value and place, and `cost` what the route attains. A
-    refused route carries the path as far as it went, if there is one.
+    was kept low, `bottleneck` has its exact value and place, and `cost` what the route attains;
+    where errors are to be survived, `survival` has what is shown. A refused route carries the path
+    as far as it went, if there is one.
     """
 
     status: Literal["arrived", "refused"]
@@ -80,6 +82,7 @@ class Route:
     cost: float = np.nan
     snaps: tuple[Landing, ...] = ()
     bottleneck: Bottleneck | None = None
+    survival: Survival | None = None
 
     def __repr__(self) -> str:
         """Length and margin, or why there is no route."""
@@ -97,6 +100,8 @@ class Route:
             rows.append([self.objective, self.cost])
         if self.bottleneck is not None:
             rows.append([f"best possible: {self.bottleneck.kind}", self.bottleneck.value])
+        if self.survival is not None:
+            rows.append(["errors", f"{self.survival.errors}: {self.survival.status}"])
         rows += [["snaps", len(self.snaps)], ["way-points", len(self.way_points)]]
         for number, place in enumerate(self.way_points, 1):
             words = ", ".join(f"{name} = {value:.6g}" for name, value in place.items())

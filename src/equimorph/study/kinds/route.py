@@ -62,6 +62,9 @@ class RouteKind(Kind[Routes]):
         both = [key for key in given if getattr(section, key) is not None]
         if len(both) > 1:
             raise requirement(f"give one of {', '.join(given)} (not {' and '.join(both)})")
+        others = [key for key in ("snap_price", "alternatives", "smooth") if getattr(section, key)]
+        if section.survive is not None and others:
+            raise requirement(f"give one of survive, {others[0]}")
         if section.smooth is not None and section.snap_price is not None:
             raise requirement("give one of smooth, snap_price: routes that snap have corners")
 
@@ -110,7 +113,7 @@ class RouteKind(Kind[Routes]):
         others = f" {len(answer)} routes differ in how they pass holes." if len(answer) > 1 else ""
         if question.section.alternatives is not None and len(answer) == 1:
             others = " No other route passes the holes of the stable set differently."
-        return f"**arrived** {snaps_in_words(route)}, {size}{rounded}.{others}"
+        return f"**arrived** {snaps_in_words(route)}, {size}{rounded}.{others}{_survival(route)}"
 
     def details(self, question: Question, answer: Routes) -> list[str]:
         """Snaps on the way, and routes side by side where there are several."""
@@ -132,6 +135,15 @@ class RouteKind(Kind[Routes]):
 
 def _name_routes(question: Question, answer: Routes) -> list[tuple[str, Route]]:
     return [(route_name(question.name, k), route) for k, route in enumerate(answer, 1)]
+
+
+def _survival(route: Route) -> str:
+    """What is shown of errors."""
+    found = route.survival
+    if found is None:
+        return ""
+    shown = f": {found.statement}" if found.proof is None else ""
+    return f" Survives {found.errors}, **{found.status}**{shown}."
 
 
 def _cost(route: Route) -> str:

@@ -22,6 +22,8 @@ from equimorph.tasks.planning.network import Demands, explain_no_route
 from equimorph.tasks.planning.objectives import Extreme, Wish
 from equimorph.tasks.planning.snap_routes import route_with_snaps
 from equimorph.tasks.planning.straightening import check_ends, verify_way_points, violation
+from equimorph.tasks.planning.surviving_routes import judged, surviving_route
+from equimorph.tasks.robustness.erring import Errors
 from equimorph.tasks.route import Corners, Route, refusal
 from equimorph.tasks.start import Start, start_state
 
@@ -37,6 +39,7 @@ def plan(  # noqa: PLR0913  # the knobs of the public face, most by keyword
     margin: float = 0.0,
     objective: Wish | Extreme = "length",
     snap_price: float | None = None,
+    survive: Mapping[str, float] | Errors | None = None,
     monitor: Sequence[Descriptor] = (),
 ) -> Route:
     """Plan a route from `start` to `goal` on which every state is stable.
@@ -74,6 +77,11 @@ def plan(  # noqa: PLR0913  # the knobs of the public face, most by keyword
         may leave its stable stratum over a fold and continue where the snap lands: `route.snaps`
         has the landings, with the energy released; no margin is kept before a snap. The snap
         happens where on its fold the route is cheapest; no route is dearer than one without.
+    survive
+        Errors that the route has to survive, by name: half widths of a box, or `Errors`. A box is
+        proved, and a probability shown by random trials; see `survival`, whose answer is
+        `route.survival`. Where the route does not survive, others with larger margins are tried.
+        Way-points are judged as they are; snaps are not allowed.
     monitor
         Descriptors to record in the schedule, in addition to those of the constraints.
 
@@ -85,7 +93,7 @@ def plan(  # noqa: PLR0913  # the knobs of the public face, most by keyword
     ------
     InputError
         If `start` or `goal` is no equilibrium of the set's problem, a way-point lies outside the
-        box, or `margin` is negative.
+        box, `margin` is negative, or an error means no parameter and no data of the structure.
     """
     start = start_state(start)
     extreme = objective if isinstance(objective, Extreme) else None
@@ -95,19 +103,28 @@ def plan(  # noqa: PLR0913  # the knobs of the public face, most by keyword
     check_ends(eset, ends)
     corners = None if via is None else _checked_corners(eset, start, goal, via)
     _check_price(snap_price, via, extreme)
+    if survive is not None and snap_price is not None:
+        raise InputError("`snap_price` must not be given with `survive`; got both.")
     why = violation(ends, demands)
     if why:
         return refusal(why, corners)
     if corners is not None:
-        return with_extreme(verify_way_points(ends, corners, demands, monitor), extreme)
-    if extreme is not None:
-        return route_with_lowest_peak(eset, ends, extreme, demands, monitor)
-    free = free_route(eset, ends, demands, monitor)
-    if snap_price is None:
-        return free or refusal(explain_no_route(eset, ends, demands))
-    snapping = route_with_snaps(eset, ends, demands, snap_price, monitor)
-    arrived = [route for route in (free, snapping) if route is not None and route.arrived]
-    return min(arrived, key=lambda route: route.cost, default=snapping)
+        given = with_extreme(verify_way_points(ends, corners, demands, monitor), extreme)
+        return given if survive is None else judged(given, ends, demands, survive)
+
+    def planned(demands: Demands) -> Route:
+        if extreme is not None:
+            return route_with_lowest_peak(eset, ends, extreme, demands, monitor)
+        free = free_route(eset, ends, demands, monitor)
+        if snap_price is None:
+            return free or refusal(explain_no_route(eset, ends, demands))
+        snapping = route_with_snaps(eset, ends, demands, snap_price, monitor)
+        arrived = [route for route in (free, snapping) if route is not None and route.arrived]
+        return min(arrived, key=lambda route: route.cost, default=snapping)
+
+    if survive is None:
+        return planned(demands)
+    return surviving_route(eset, ends, demands, survive, planned)
 
 
 def _check_price(

@@ -130,7 +130,7 @@ def stable_room(  # all but two by keyword
         raise InputError("`states` must be stable; got unstable ones.")
     rays = _Rays(batch, places, widths, shape, tuple(within), most)
     generator = np.random.default_rng(seed)
-    rays.try_all(_directions(len(widths), generator))
+    rays.try_all(error_directions(len(widths), generator))
     spread = 0.5
     for _ in range(ROUNDS):
         rays.try_around(spread, generator)
@@ -138,7 +138,7 @@ def stable_room(  # all but two by keyword
     return rays.room(tuple(tolerances))
 
 
-def _directions(d: int, generator: np.random.Generator) -> Directions:
+def error_directions(d: int, generator: np.random.Generator) -> Directions:
     """Both ways along each parameter, corners of the box, and random ones."""
     units = np.concatenate([np.eye(d), -np.eye(d)])
     if 2**d <= MOST_CORNERS:

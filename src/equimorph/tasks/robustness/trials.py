@@ -147,19 +147,12 @@ def random_trials(  # all but three by keyword
     widths = np.array([float(value) for value in spreads.values()])
     if len(widths) == 0:
         raise InputError("`spreads` must name at least one parameter; got none.")
-    rows = _rows(start, schedule)
     offsets = np.random.default_rng(seed).normal(size=(trials, len(names))) * widths
     shift = np.zeros((trials, len(start.p)))
     shift[:, places] = offsets
-    cuts, sink = cut_rows(trials, workers), progress or Silent()
-    sink.report("trials", 0, len(cuts))
-    ends = map_rows(
-        _Execution(start, rows, tuple(within)), _Errors(shift), cuts, workers,
-        lambda done: sink.report("trials", done, len(cuts)),
-    )  # fmt: skip
-    kind = np.where((ends.kind != "arrived") & (ends.at < 1.0), "start", ends.kind)
-    states = States(structure, ends.z, ends.p)
-    return Trials(names, offsets, kind, np.maximum(ends.at - 1.0, 0.0), states)
+    execution = Execution(start, corner_rows(start, schedule), tuple(within))
+    ends = execution.of_all(shift, progress, workers)
+    return Trials(names, offsets, ends.kind, ends.at, States(structure, ends.z, ends.p))
 
 
 @dataclass(frozen=True)
@@ -170,8 +163,8 @@ class _Errors(Columns):
 
 
 @dataclass(frozen=True)
-class _Ends(Columns):
-    """How each lift ended, where, and in which state."""
+class TrialEnds(Columns):
+    """How each trial ended, where, and in which state; see `Trials`."""
 
     kind: Shaped[np.ndarray, " trials"]
     at: Float[np.ndarray, " trials"]
@@ -180,28 +173,43 @@ class _Ends(Columns):
 
 
 @dataclass(frozen=True)
-class _Execution:
+class Execution:
     """Executes a schedule, given by all parameters at its corners, with errors."""
 
     start: State
     rows: Parameters
     within: tuple[Constraint, ...]
 
-    def __call__(self, errors: _Errors) -> _Ends:
-        """Lift one trial beside the other."""
+    def of_all(
+        self,
+        shift: Parameters,
+        progress: Progress | None = None,
+        workers: Workers | None = None,
+    ) -> TrialEnds:
+        """Ends of the trials with some errors of all parameters, which workers may share."""
+        cuts, sink = cut_rows(len(shift), workers), progress or Silent()
+        sink.report("trials", 0, len(cuts))
+        return map_rows(
+            self, _Errors(shift), cuts, workers,
+            lambda done: sink.report("trials", done, len(cuts)),
+        )  # fmt: skip
+
+    def __call__(self, errors: _Errors) -> TrialEnds:
+        """Lift one trial beside the other; the first leg brings in the errors."""
         structure, shift = self.start.structure, errors.shift
         z, p = (np.tile(each, (len(shift), 1)) for each in (self.start.z, self.start.p))
         every = names_of(structure.parameters)
         legs = [_leg(every, row + shift) for row in (self.start.p, *self.rows)]
         lifts = lift(States(structure, z, p), legs, within=self.within)
-        return _Ends(lifts.kind, lifts.at, lifts.states.z, lifts.states.p)
+        kind = np.where((lifts.kind != "arrived") & (lifts.at < 1.0), "start", lifts.kind)
+        return TrialEnds(kind, np.maximum(lifts.at - 1.0, 0.0), lifts.states.z, lifts.states.p)
 
 
 def _leg(names: tuple[str, ...], p: Parameters) -> dict[str, Values]:
     return {name: p[:, k].copy() for k, name in enumerate(names)}
 
 
-def _rows(
+def corner_rows(
     start: State, schedule: Schedule | Sequence[Mapping[str, float]]
 ) -> Float[np.ndarray, "rows parameters"]:
     """All parameters at the corners after the start."""
