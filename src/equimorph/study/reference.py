@@ -36,6 +36,7 @@ SHARED = {
     "batch": "Lifts side by side.",
     "reach": "Longest extension of a tree, in scaled parameters.",
     "seed": "Seed of the random numbers.",
+    "probability": "With which a route survives normally distributed errors; else all of a box.",
     "accelerations": "Largest changes of rates per unit of time.",
     "jerks": "Largest changes of accelerations per unit of time; they need accelerations.",
     "links": "Links of each member of a chain.",

@@ -29,8 +29,10 @@ from equimorph.tasks.verification.proof import (
     kind_of_bounds,
 )
 
-MOST_CELLS = 6000
-"""Cells that are tried before the proof of a tube is given up."""
+MOST_CELLS = 20_000
+"""Cells that are tried at most before the proof of a tube is given up."""
+MOST_ENTRIES = 20_000_000
+"""Entries of their matrices that are."""
 MOST_ROUNDS = 14
 """Bisections of a segment and of the box around it before that."""
 HOPELESS = 4.0
@@ -153,6 +155,7 @@ class Tube:
                 "its second derivatives and has too many to sample"
             )
             return TubeProof(why, 0, kind, sampled)
+        most = min(MOST_CELLS, MOST_ENTRIES // self._structure.size**2)
         whole = self._judge(self._first_cells())
         tried = len(whole.cells.lower)
         for _ in range(MOST_ROUNDS):
@@ -161,7 +164,7 @@ class Tube:
                 bad = _apart(whole)
             if len(bad) == 0:
                 return TubeProof("", len(whole.good), kind, sampled)
-            if tried + 2 * len(bad) > MOST_CELLS:
+            if tried + 2 * len(bad) > most:
                 break
             divided = self._divide(whole.take(bad))
             if divided is None:
