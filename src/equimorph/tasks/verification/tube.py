@@ -37,6 +37,8 @@ MOST_ROUNDS = 14
 """Bisections of a segment and of the box around it before that."""
 HOPELESS = 4.0
 """Ratio of what errors of data and all others move states in a cell that need not be divided."""
+ROUNDING = 1e-13
+"""More than the rounding of what two cells expect at their common face, relative to the states."""
 
 Corners = Float[np.ndarray, "cells axes"]
 
@@ -327,8 +329,9 @@ def _apart(judged: _Judged) -> Int[np.ndarray, " cells"]:
         each[:, None] * judged.bounds.weights
         for each in (judged.bounds.error, judged.bounds.unique)
     )
-    there = (gap + near[one] <= alone[other]).all(axis=1)
-    back = (gap + near[other] <= alone[one]).all(axis=1)
+    gap = gap + ROUNDING * (1.0 + np.abs(judged.cells.before[one]))
+    there = (gap + near[one] < alone[other]).all(axis=1)
+    back = (gap + near[other] < alone[one]).all(axis=1)
     return np.unique(pairs[~(there | back)])
 
 
