@@ -7,6 +7,7 @@ import numpy as np
 from equimorph.array_types import Float
 from equimorph.arrays import Flags, Lanes, Nodal, Parameters, Scalars, Sides, Values, Velocity
 from equimorph.linalg import BorderedSolution, CondensedLayout, no_border
+from equimorph.linalg.intervals import Interval
 from equimorph.linalg.lanes import over_lanes
 from equimorph.linalg.sparse import SparseLayout
 from equimorph.structures.contract import Symmetry
@@ -14,12 +15,14 @@ from equimorph.structures.equations import (
     Advance,
     AnyBorder,
     Direction,
+    Enclosed,
     JointEquations,
     Shift,
     Solver,
 )
 from equimorph.structures.rod.discretisation import Reference
 from equimorph.structures.rod.fields import GeneralFields
+from equimorph.structures.rod.general_enclosure import enclose_rod
 from equimorph.structures.rod.general_kernels import linearise_lanes, second_lanes
 from equimorph.structures.rod.general_step_kernels import advance_lanes
 from equimorph.structures.rod.inertia import following, moved_places, place_derivatives
@@ -279,6 +282,12 @@ class GeneralMechanics(JointEquations, PlanarMechanics):
             total += w_pull * self._area.gradient_derivative(theta, v_theta)
             out[:, : self.unknowns] -= total[:, self.unknown_nodes]
         return out
+
+    def enclosure(self, z: Interval, p: Interval) -> Enclosed | None:
+        """Bounds over boxes; None for rods under pressure."""
+        if self._area is not None:
+            return None
+        return enclose_rod(self.model, self.layout.assembled, self.unknown_nodes, z, p)
 
     def solver(
         self, parts: tuple[np.ndarray, ...], z: Lanes, p: Parameters, shift: Shift = None
