@@ -21,6 +21,12 @@ ROUND_OFF = 1e-12
 """Part of the range of a function below which its values count as zero."""
 STILL = 1e-11
 """Share of an edge by which the last step moves at most."""
+PATIENCE = 4
+"""Steps in which a bracket must halve; else it is halved from then on: regula falsi creeps up to
+jumps."""
+NARROW, STEEP = 1e-7, 1e-3
+"""A function jumps where it changes by this share of its values at the ends within so small a share
+of an edge; the place of a jump need not be known better."""
 
 Values = Float[np.ndarray, " V"]
 Function = Callable[[Vertices], Values]
@@ -139,7 +145,9 @@ def roots(
     known: Float[np.ndarray, "n 2"],
     value_of: Callable[[Vertices, Some], Float[np.ndarray, " some"]],
 ) -> tuple[ItemFlags, Vertices]:
-    """Vertices where a function vanishes on edges, by regula falsi (Illinois).
+    """Vertices where a function vanishes or jumps through zero on edges.
+
+    By regula falsi (Illinois), and by halves where that is slow.
 
     Parameters
     ----------
@@ -156,17 +164,24 @@ def roots(
     """
     low, high = np.zeros(len(ends)), np.ones(len(ends))
     at_low, at_high = known.T.copy()
-    small = ROUND_OFF * np.maximum(np.abs(at_low), np.abs(at_high))
+    size = np.maximum(np.abs(at_low), np.abs(at_high))
+    below, above = at_low.copy(), at_high.copy()
     todo, done = np.arange(len(ends)), np.zeros(len(ends), bool)
     moved = np.zeros(len(ends), int)
     lanes, found, last = [], [], np.full(len(ends), np.inf)
-    for _ in range(TRIALS):
+    widths, slow = np.full((PATIENCE, len(ends)), np.inf), np.zeros(len(ends), bool)
+    for number in range(TRIALS):
         t = low[todo] - at_low[todo] * (high - low)[todo] / (at_high - at_low)[todo]
+        slow |= high - low > 0.5 * widths[number % PATIENCE]
+        t = np.where(slow[todo], 0.5 * (low + high)[todo], t)
+        widths[number % PATIENCE] = high - low
         bounds = low[todo], high[todo]
         good, at, t = _somewhere(fabric, ends[todo], mark, index[todo], bounds, t)
         todo, t = todo[good], t[good]
         value = value_of(at, todo)
-        ended = (np.abs(value) <= small[todo]) | (np.abs(t - last[todo]) < STILL)
+        ended = (np.abs(value) <= ROUND_OFF * size[todo]) | (np.abs(t - last[todo]) < STILL)
+        jumps = np.abs(above - below)[todo] > STEEP * size[todo]
+        ended |= jumps & ((high - low)[todo] < NARROW)
         last[todo] = t
         found.append(at.take(np.flatnonzero(ended)))
         lanes.append(todo[ended])
@@ -176,6 +191,9 @@ def roots(
             break
         left = value * at_low[todo] > 0.0
         low[todo], high[todo] = np.where(left, t, low[todo]), np.where(left, high[todo], t)
+        below[todo], above[todo] = (
+            np.where(left, value, below[todo]), np.where(left, above[todo], value)
+        )  # fmt: skip
         # an end that stays twice counts half, so that it moves eventually
         share = np.where(moved[todo] == np.where(left, -1, 1), 0.5, 1.0)
         at_low[todo] = np.where(left, value, share * at_low[todo])

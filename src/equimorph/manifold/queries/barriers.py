@@ -148,12 +148,19 @@ class SetBarriers:
 
     @cached_property
     def at_vertices(self) -> ItemValues:
-        """Barriers at the vertices of the set, zero at unstable ones."""
+        """Values of the descriptor at the vertices of the set, infinite with nothing to snap to."""
         eset = self.eset
         values = np.zeros(len(eset.points))
         stable = np.flatnonzero(eset.index == 0)
-        values[stable] = self.of(eset.points[stable]).energy
+        z, p = eset.points.z[stable], eset.points.p[stable]
+        values[stable] = self._of(z, p, exact=False).energy
         return values
+
+    @cached_property
+    def _numbers(self) -> dict[bytes, int]:
+        """Numbers of the vertices by their parameters and unknowns, bit for bit."""
+        rows = np.concatenate([self.eset.points.p, self.eset.points.z], axis=1)
+        return {row.tobytes(): number for number, row in enumerate(rows)}
 
     @cached_property
     def ceiling(self) -> float:
@@ -175,7 +182,10 @@ class SetBarriers:
 
     def _values(self, z: Lanes, p: Parameters) -> Values:
         out, ceiling = np.zeros(len(z)), self.ceiling
-        inside = self._inside(p)
+        rows = np.concatenate([p, z], axis=1)
+        vertex = np.array([self._numbers.get(row.tobytes(), NONE) for row in rows], int)
+        out[vertex >= 0] = self.at_vertices[vertex[vertex >= 0]]
+        inside = self._inside(p) & (vertex < 0)
         if inside.any():
             out[inside] = self._of(z[inside], p[inside], exact=False).energy
         return np.minimum(np.nan_to_num(out, posinf=ceiling), ceiling)
