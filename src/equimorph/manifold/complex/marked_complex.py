@@ -26,7 +26,12 @@ from equimorph.arrays import (
 from equimorph.linalg.lanes import results_of
 from equimorph.manifold.complex.description import Complex
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
-from equimorph.manifold.complex.vertices import Vertices, on_constraints, vertices_of
+from equimorph.manifold.complex.vertices import (
+    Vertices,
+    on_constraints,
+    vertices_of,
+    vertices_without_frames,
+)
 from equimorph.manifold.geometry.kernels import cut_rows, look_back, number_edges, square_sides
 from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.setting import Setting
@@ -254,8 +259,11 @@ def held_parameters(mark: int, dimension: int) -> list[int]:
     return [k for k in range(dimension) if mark & (3 * FacetMark.SIDE << 2 * k)]
 
 
-def fabric_of(eset: EquilibriumSet) -> Fabric:
-    """Return a set as a fabric: its sheets are parted where they cross."""
+def fabric_of(eset: EquilibriumSet, *, framed: bool = True) -> Fabric:
+    """Return a set as a fabric: its sheets are parted where they cross.
+
+    Without frames at its vertices, which take most of the time, it serves to select cells.
+    """
     setting, d = eset.setting, len(eset.names)
     crossings, folds = (
         np.concatenate([np.zeros((0, d), int), *(_facets(piece, d) for piece in pieces)])
@@ -266,11 +274,11 @@ def fabric_of(eset: EquilibriumSet) -> Fabric:
     z, p = eset.points.z[origin], eset.points.p[origin]
     whole = adjacency(cells)
     sense = senses(cells, eset.cell_index, eset.coordinates[origin], whole)
-    rows = best_corners(setting, z, p, cells, sense.signs)
-    kinds, index, grid_vertex = (
-        column[origin] for column in (eset.kinds, eset.index, eset.grid_vertex)
-    )
-    vertices = vertices_of(setting, z, p, kinds, index, grid_vertex, rows)
+    columns = (z, p, *(each[origin] for each in (eset.kinds, eset.index, eset.grid_vertex)))
+    if framed:
+        vertices = vertices_of(setting, *columns, best_corners(setting, z, p, cells, sense.signs))
+    else:
+        vertices = vertices_without_frames(*columns)
     common = np.where(np.isin(origin, crossings), origin, -1)
     vertices = replace(vertices, shared=common)
     known = origin[whole.facets]
@@ -285,7 +293,7 @@ def fabric_of(eset: EquilibriumSet) -> Fabric:
     if d >= TRIANGLES:
         against = sense.signs < 0
         cells[against, -2:] = cells[against, :-3:-1]
-    squared = squared_sides(vertices.place, cells)
+    squared = squared_sides(vertices.place, cells) if framed else np.zeros((len(cells), 0))
     facets = (whole.facets[marked], marks[marked])
     return Fabric(setting, box, vertices, cells, eset.cell_index, *facets, squared)
 

@@ -132,6 +132,20 @@ def vertices_of(
     return _with_slopes(setting, z, p, kinds, index, grid_vertex, frame, slopes)
 
 
+def vertices_without_frames(
+    z: Float[np.ndarray, "V size"],
+    p: Float[np.ndarray, "V P"],
+    kinds: VertexNumbers,
+    index: VertexNumbers,
+    grid_vertex: VertexNumbers,
+) -> Vertices:
+    """Vertices of which neither frames nor slopes are known, nor places in the embedding."""
+    none, lone = np.zeros((len(z), 0)), np.full(len(z), -1)
+    frames = np.zeros((len(z), 0, 0))
+    unknown = (none, frames, frames, none, none, none)
+    return Vertices(z, p, kinds, index, grid_vertex, *unknown, lone)
+
+
 def free_vertices(setting: Setting, at: Corrected) -> Vertices:
     """Vertices inside sheets."""
     count, d = at.frames.shape[:2]

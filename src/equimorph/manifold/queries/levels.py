@@ -170,7 +170,7 @@ def cell_sizes(eset: EquilibriumSet) -> Float[np.ndarray, " C"]:
 @check_arguments
 def part(eset: EquilibriumSet, cells: CellFlags) -> EquilibriumSet:
     """Selected cells as a set, like the stable ones: ``eset.cell_index == 0``."""
-    fabric = fabric_of(eset)
+    fabric = fabric_of(eset, framed=False)
     nothing = np.zeros(len(fabric.vertices), bool)
     return part_of(eset, fabric, cells, nothing, 0)
 
