@@ -31,7 +31,6 @@ def stable_values(eset: EquilibriumSet, descriptor: Descriptor) -> Float[np.ndar
     return np.asarray(from_cache(eset, ("values", descriptor), compute))
 
 
-@kept
 def stable_vertices(eset: EquilibriumSet) -> Bool[np.ndarray, " V"]:
     """Vertices of stable cells, those on folds among them."""
     stable = np.zeros(len(eset.points), bool)

@@ -5,6 +5,8 @@ from functools import wraps
 from typing import Any, TypeVar
 from weakref import WeakKeyDictionary
 
+import numpy as np
+
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 
 _KEPT: WeakKeyDictionary[EquilibriumSet, dict[Any, Any]] = WeakKeyDictionary()
@@ -24,11 +26,16 @@ def from_cache(eset: EquilibriumSet, key: Any, compute: Callable[[], Any]) -> An
 
 
 def kept(compute: Callable[[EquilibriumSet], Table]) -> Callable[[EquilibriumSet], Table]:
-    """A function of a set, computed once for each set; see `from_cache`."""
+    """A function of a set, computed once for each set; see `from_cache`.
+
+    An array is the same one each time, which nobody may change.
+    """
 
     @wraps(compute)
     def table(eset: EquilibriumSet) -> Table:
         found: Table = from_cache(eset, compute, lambda: compute(eset))
+        if isinstance(found, np.ndarray):
+            found.flags.writeable = False
         return found
 
     return table
