@@ -274,11 +274,14 @@ def fabric_of(eset: EquilibriumSet, *, framed: bool = True) -> Fabric:
     z, p = eset.points.z[origin], eset.points.p[origin]
     whole = adjacency(cells)
     sense = senses(cells, eset.cell_index, eset.coordinates[origin], whole)
-    columns = (z, p, *(each[origin] for each in (eset.kinds, eset.index, eset.grid_vertex)))
+    kinds, index, grid_vertex = (
+        column[origin] for column in (eset.kinds, eset.index, eset.grid_vertex)
+    )
     if framed:
-        vertices = vertices_of(setting, *columns, best_corners(setting, z, p, cells, sense.signs))
+        rows = best_corners(setting, z, p, cells, sense.signs)
+        vertices = vertices_of(setting, z, p, kinds, index, grid_vertex, rows)
     else:
-        vertices = vertices_without_frames(*columns)
+        vertices = vertices_without_frames(z, p, kinds, index, grid_vertex)
     common = np.where(np.isin(origin, crossings), origin, -1)
     vertices = replace(vertices, shared=common)
     known = origin[whole.facets]
