@@ -5,17 +5,16 @@ In each cell the sheet is compared with its tangent plane at the middle, by the 
 states are the same as soon as they agree in one point of it: both carry exactly one, continuously.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
 from equimorph.array_types import Float
-from equimorph.arrays import Flags, Lanes, Numbers, Pairs, Parameters
+from equimorph.arrays import Flags, Lanes, Numbers, Parameters
 from equimorph.columns import Columns
-from equimorph.equilibria import Event, TraceOptions, lift, settle
+from equimorph.equilibria import Event, TraceOptions, lift
 from equimorph.equilibria.legs import check_starts
-from equimorph.linalg.intervals import MORE, Interval, product
 from equimorph.model import Box, position
 from equimorph.structures import State, States, Structure
 from equimorph.tasks.verification.error_box import ErrorBox, Responses
@@ -26,13 +25,11 @@ from equimorph.tasks.verification.proof import (
     bounds_in_parts,
     kind_of_bounds,
 )
+from equimorph.tasks.verification.tube import ROUNDING, neighbours, parted
 
 LEAST_SHARE = 1e-12
 """What half widths count beside the moves of states where a cell is cut."""
-SAME_FACE = 1e-9
-"""Gap between two cells, relative to their widths, that rounding explains."""
 
-Sizes = Float[np.ndarray, " any"]
 Corners = Float[np.ndarray, "cells d"]
 
 
@@ -125,32 +122,33 @@ def certify_box(state: State, box: Box, *, margin: float = 0.0, most: int = 10_0
     """
     check_starts(state.batch)
     sheet = _Sheet(state.structure, box, margin, most)
-    middle, half = 0.5 * (box.lower + box.upper), 0.5 * (box.upper - box.lower)
-    begin = _Cells(state.z[None], state.p[None], _with_room(half, middle)[None])
+    corner = np.ones((1, len(box.names)))
+    begin = _Cells(state.z[None], state.p[None], -corner, corner)
     kind = kind_of_bounds(state.batch)
     if kind == "unknown":
         why = "the structure knows no bounds of its derivatives and has too many to sample"
         return sheet.result("sampled", begin, why, state)
     if state.index != 0:
         return sheet.result(kind, begin, "the state is unstable", state)
-    cells, lost = sheet.move(begin, middle[None])
+    cells, lost = sheet.move(begin)
     if lost is not None:
         return sheet.result(kind, begin, f"the way to its middle ends at a {lost.kind}", lost.state)
     return sheet.prove(kind, cells)
 
 
-def _with_room(half: Sizes, middle: Sizes) -> Sizes:
-    """Half widths of cells that leave no gap where middles are rounded."""
-    return np.asarray(half * MORE + 4.0 * np.spacing(np.abs(middle) + half))
-
-
 @dataclass(frozen=True)
 class _Cells(Columns):
-    """States at the middles of cells, and the half widths of these."""
+    """States at the middles of cells, and their corners, as places of the box in [−1, 1]."""
 
     z: Lanes
     p: Parameters
-    half: Corners
+    lower: Corners
+    upper: Corners
+
+    @property
+    def middle(self) -> Corners:
+        """Places of the middles; exact, as cells are halves of halves."""
+        return np.asarray(0.5 * (self.lower + self.upper))
 
 
 @dataclass(frozen=True)
@@ -160,6 +158,12 @@ class _Judged(Columns):
     cells: _Cells
     bounds: Bounds
     responses: Responses
+
+    def at(self, places: Corners) -> Lanes:
+        """Tangent planes at places."""
+        cells = self.cells
+        share = 2.0 * (places - cells.middle) / (cells.upper - cells.lower)
+        return np.asarray(cells.z + (share[:, :, None] * self.responses).sum(axis=1))
 
 
 @dataclass(frozen=True)
@@ -191,11 +195,11 @@ class _Sheet:
             tubes = bounds.unique[:, None] * bounds.weights
         least = float(bounds.margin.min()) if bounds is not None and not why else 0.0
         states = States(self.structure, cells.z, cells.p)
-        return BoxProof(why, self.box, states, cells.half, tubes, least, kind, failed)
+        return BoxProof(why, self.box, states, self.half(cells), tubes, least, kind, failed)
 
     def prove(self, kind: Evidence, cells: _Cells) -> BoxProof:
         """Bisect cells until all are proved and joined, or one of them is lost, or too many."""
-        whole, tried = self._judge(cells), len(cells.half)
+        whole, tried = self._judge(cells), len(cells.lower)
         while True:
             bad = np.flatnonzero(~self._good(whole))
             if len(bad) == 0:
@@ -214,20 +218,25 @@ class _Sheet:
             rest = whole.take(np.setdiff1d(np.arange(len(whole.responses)), bad))
             whole = _Judged.concatenate([rest, self._judge(halves)])
 
-    def move(self, cells: _Cells, middles: Corners) -> tuple[_Cells, Event | None]:
-        """Cells with other middles, to which their states are lifted; or what a lift met."""
-        states = States(self.structure, cells.z, cells.p)
+    def half(self, cells: _Cells) -> Corners:
+        """Half widths of cells in the units of the parameters."""
+        return np.asarray(0.25 * (cells.upper - cells.lower) * (self.box.upper - self.box.lower))
+
+    def move(self, cells: _Cells) -> tuple[_Cells, Event | None]:
+        """Cells whose states are lifted to their middles; or what a lift met."""
+        states, box = States(self.structure, cells.z, cells.p), self.box
+        middles = 0.5 * (box.lower + box.upper) + 0.5 * cells.middle * (box.upper - box.lower)
         if np.array_equal(states.p[:, self.places], middles):
             return cells, None
-        columns = {name: middles[:, k].copy() for k, name in enumerate(self.box.names)}
+        columns = {name: middles[:, k].copy() for k, name in enumerate(box.names)}
         lifts = lift(states, columns, options=TraceOptions(record=False))
-        lost = np.flatnonzero(~lifts.arrived)
-        found = lifts.states
-        return _Cells(found.z, found.p, cells.half), lifts[int(lost[0])] if len(lost) else None
+        lost, found = np.flatnonzero(~lifts.arrived), lifts.states
+        event = lifts[int(lost[0])] if len(lost) else None
+        return replace(cells, z=found.z, p=found.p), event
 
     def _errors(self, cells: _Cells) -> ErrorBox:
-        steps = np.zeros((len(cells.half), len(self.places), cells.p.shape[1]))
-        steps[:, range(len(self.places)), self.places] = cells.half
+        steps = np.zeros((len(cells.lower), len(self.places), cells.p.shape[1]))
+        steps[:, range(len(self.places)), self.places] = self.half(cells)
         return ErrorBox(steps)
 
     def _judge(self, cells: _Cells) -> _Judged:
@@ -246,56 +255,18 @@ class _Sheet:
         """Both halves of cells, cut across the parameter that moves their states most."""
         cells, n = judged.cells, self.structure.unknowns
         moves = judged.responses[:, :, :n] ** 2 @ self.structure.mass
-        widths = cells.half / self.structure.scales[self.places]
+        widths = self.half(cells) / self.structure.scales[self.places]
         axis = np.argmax(moves + LEAST_SHARE * widths**2, axis=1)
-        rows = np.arange(len(axis))
-        half, parts = cells.half.copy(), []
-        half[rows, axis] = _with_room(0.5 * half[rows, axis], cells.p[rows, self.places[axis]])
-        for sign in (-0.5, 0.5):
-            middles = cells.p[:, self.places]
-            middles[rows, axis] += sign * cells.half[rows, axis]
-            part, lost = self.move(_Cells(cells.z, cells.p, half), middles)
-            if lost is not None:
-                return cells, lost
-            parts.append(part)
-        return _Cells.concatenate(parts), None
+        rows, lower, upper = np.arange(len(axis)), cells.lower.copy(), cells.upper.copy()
+        lower[rows, axis] = upper[rows, axis] = cells.middle[rows, axis]
+        parts = replace(cells, upper=upper), replace(cells, lower=lower)
+        return self.move(_Cells.concatenate(parts))
 
     def _apart(self, whole: _Judged) -> Numbers:
         """Cells whose states are not shown to be those of a neighbour at their common face."""
-        pairs, points = self._faces(whole.cells)
-        if len(pairs) == 0:
-            return np.zeros(0, int)
-        first = whole.take(pairs[:, 0])
-        guess = first.cells.z + self._offset(first, points).middle
-        p = first.cells.p.copy()
-        p[:, self.places] = points
-        states = States(self.structure, settle(self.structure, guess, p).z, p)
-        exact = bounds_in_parts(states, lambda rows: segment_bounds(states[rows], states[rows]))
-        ball = (exact.error[:, None] * exact.weights, exact.proved)
-        good = ball[1].copy()
-        for side in (first, whole.take(pairs[:, 1])):
-            gap = (Interval.at(states.z) - side.cells.z - self._offset(side, points)).size
-            tube = side.bounds.unique[:, None] * side.bounds.weights
-            good &= (gap + ball[0] < tube * (1.0 - 1e-12)).all(axis=1)
-        return np.unique(pairs[~good])
-
-    def _offset(self, judged: _Judged, points: Corners) -> Interval:
-        """Change of the tangent plane from the middles of cells to points."""
-        share = (Interval.at(points) - judged.cells.p[:, self.places]) / judged.cells.half
-        turned = np.ascontiguousarray(judged.responses.transpose(0, 2, 1))
-        return product(turned, share[:, :, None])[:, :, 0]
-
-    def _faces(self, cells: _Cells) -> tuple[Pairs, Corners]:
-        """Pairs of cells that share a face, and the middles of these."""
-        middle, half = cells.p[:, self.places], cells.half
-        low, high, pairs, points = middle - half, middle + half, [], []
-        for k in range(len(half) - 1):
-            below, above = np.maximum(low[k], low[k + 1 :]), np.minimum(high[k], high[k + 1 :])
-            thin = above - below <= SAME_FACE * half[k]
-            touch = (above - below >= -SAME_FACE * half[k]).all(axis=1) & (thin.sum(axis=1) == 1)
-            others = np.flatnonzero(touch)
-            pairs.append(np.stack([np.full(len(others), k), k + 1 + others], axis=1))
-            points.append(0.5 * (below + above)[others])
-        if not pairs:
-            return np.zeros((0, 2), int), np.zeros((0, len(self.places)))
-        return np.concatenate(pairs), np.concatenate(points)
+        pairs = neighbours(whole.cells.lower, whole.cells.upper)
+        one, other = (whole.take(rows) for rows in pairs.T)
+        low = np.maximum(one.cells.lower, other.cells.lower)
+        place = 0.5 * (low + np.minimum(one.cells.upper, other.cells.upper))
+        gap = np.abs(one.at(place) - other.at(place)) + ROUNDING * (1.0 + np.abs(one.cells.z))
+        return parted(pairs, gap, whole.bounds)

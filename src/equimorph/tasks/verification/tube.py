@@ -320,22 +320,27 @@ class Tube:
 def _apart(judged: _Judged) -> Int[np.ndarray, " cells"]:
     """Numbers of cells whose states are not shown to be those of a neighbour."""
     lower, upper = judged.cells.lower, judged.cells.upper
-    pairs = _neighbours(lower, upper)
+    pairs = neighbours(lower, upper)
     one, other = pairs.T
     low = np.maximum(lower[one], lower[other])
     high = np.minimum(upper[one], upper[other])
     gap = np.abs(_at(judged, one, 0.5 * (low + high)) - _at(judged, other, 0.5 * (low + high)))
-    near, alone = (
-        each[:, None] * judged.bounds.weights
-        for each in (judged.bounds.error, judged.bounds.unique)
-    )
-    gap = gap + ROUNDING * (1.0 + np.abs(judged.cells.before[one]))
+    return parted(pairs, gap + ROUNDING * (1.0 + np.abs(judged.cells.before[one])), judged.bounds)
+
+
+def parted(pairs: Pairs, gap: Lanes, bounds: Bounds) -> Int[np.ndarray, " cells"]:
+    """Numbers of cells, among pairs whose expectations differ by a gap, that may have two states.
+
+    They have one if the state of either lies where the other has only one.
+    """
+    near, alone = (each[:, None] * bounds.weights for each in (bounds.error, bounds.unique))
+    one, other = pairs.T
     there = (gap + near[one] < alone[other]).all(axis=1)
     back = (gap + near[other] < alone[one]).all(axis=1)
     return np.unique(pairs[~(there | back)])
 
 
-def _neighbours(lower: Corners, upper: Corners) -> Pairs:
+def neighbours(lower: Corners, upper: Corners) -> Pairs:
     """Pairs of cells that share a face."""
     order = np.argsort(lower[:, 0], kind="stable")
     begins = lower[order, 0]
