@@ -40,8 +40,8 @@ def test_a_strip_between_pitchforks_hangs_together(strip):
 
 @pytest.mark.parametrize(
     ("squared_width", "sign", "euler"),
-    [("0.01", -1, -1), ("0.01*(0.5 - b)*(b + 0.5)", 1, 3)],
-    ids=["subcritical", "closed"],
+    [("0.01", -1, -1), ("0.01*(0.5 - b)*(b + 0.5)", 1, 3), ("0.0009", 1, -1)],
+    ids=["subcritical", "closed", "seen by no vertex"],
 )
 def test_strips_on_another_grid(squared_width, sign, euler):
     """A closed strip is a sphere: plane 1, sphere 2, less their common circle 0."""
@@ -57,3 +57,15 @@ def test_all_states_over_the_strip_are_in_the_set(strip):
         expected = np.sqrt(0.01 - 0.03**2) * np.array([-1, 0, 1])
         np.testing.assert_allclose(inside, expected, atol=1e-9)
         assert len(strip.at(a=SLANT * b + 0.13, b=b)) == 1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("sign", [1, -1], ids=["supercritical", "subcritical"])
+@pytest.mark.parametrize("grid", [(6, 6), (9, 7), (12, 12)])
+@pytest.mark.parametrize("width", [0.05, 0.02, 0.01])
+def test_strips_that_no_vertex_meets_are_found_or_named(width, grid, sign):
+    """Down to a 35th of an interval, at which bisection ends on the coarsest grid."""
+    audit = lifted(tube(repr(width**2), sign), grid).audit
+    if width > 0.01 or grid != (6, 6):
+        assert audit.clean
+    assert not audit.clean or audit.euler_characteristic == -1

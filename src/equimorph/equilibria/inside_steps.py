@@ -10,13 +10,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from equimorph.array_types import Bool, Float
+from equimorph.array_types import Float
 from equimorph.arrays import Flags, Lanes, Numbers, Some
 from equimorph.columns import Columns
 from equimorph.equilibria.critical import Critical, null_border
 from equimorph.equilibria.curves import Curve, squared_length
+from equimorph.equilibria.determinants import determinant, may_vanish
 from equimorph.equilibria.events import Events, locate_all
-from equimorph.equilibria.kernels import EARLY_DIP, EARLY_NEAR
 from equimorph.equilibria.locate import hermite
 from equimorph.equilibria.steps import Bracket, Front, least_inside, step_along
 from equimorph.equilibria.trace_options import EventCode, TraceOptions
@@ -101,27 +101,10 @@ def inside_only_steps(curve: Curve, bracket: Bracket, options: TraceOptions) -> 
     here, old, new = curve.take(step.lanes), step.before, step.after
     middle = hermite(step, np.full(len(step.lanes), 0.5))
     places = ((old.z, old.t), middle, (new.z, new.t))
-    some = np.flatnonzero(_may_vanish(np.stack([_determinant(here, *at) for at in places])))
+    some = np.flatnonzero(may_vanish(np.stack([determinant(here, *at) for at in places])))
     step, unknown = step.take(some), np.full(len(some), np.nan)
     span = Span(step.lanes, step.before, step.after, np.zeros(len(some)), step.step, unknown)
     return [inside_spans(curve, span, options)]
-
-
-def _determinant(curve: Curve, z: Lanes, t: Values) -> Values:
-    """Determinant of F_z."""
-    still, one, none = np.zeros_like(z), np.ones(len(z)), np.zeros(len(z))
-    return curve.advance(np.ascontiguousarray(z), t, still, one, none).determinant
-
-
-def _may_vanish(values: Float[np.ndarray, "3 steps"]) -> Bool[np.ndarray, " steps"]:
-    """Whether what has such values at start, middle and end may touch zero or cross it twice."""
-    start, middle, end = np.sign(values[0]) * values
-    bow, slope = start + end - 2.0 * middle, end - start
-    with np.errstate(divide="ignore", invalid="ignore"):
-        least = middle - slope * (slope / (8.0 * bow))  # a determinant's square may overflow
-    dips = (np.abs(slope) < 2.0 * bow) & (least < EARLY_DIP * np.minimum(start, end))
-    low = np.minimum(start, end) < EARLY_NEAR * middle
-    return np.asarray(dips | low | (middle < EARLY_NEAR * np.minimum(start, end)))
 
 
 @dataclass(frozen=True)

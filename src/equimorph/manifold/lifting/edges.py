@@ -157,7 +157,7 @@ def _trace(pairing: Pairing, rays: Rays, line: ParameterLine, effort: int) -> No
         first_step=0.05 * finer,
         largest_step=0.5 * finer,
         turning=0.25 * finer,
-        look_inside=False,
+        look_inside=effort > 0,
     )
     traced = _follow(pairing, rays, line, options)
     np.add.at(pairing.effort, rays.edges[~traced.good], 1)
@@ -250,14 +250,17 @@ def _inner(
         again = _pin(pairing, those, z[doubtful], p[doubtful], VertexKind.FOLD)
         keep[doubtful] = again.found
     rows: dict[int, list[Inner]] = {}
-    places: dict[int, float] = {}
-    for k in np.flatnonzero(keep):
-        lane, travelled = int(passed.lanes[at[k]]), float(passed.travelled[at[k]])
+    last: dict[int, int] = {}
+    for k in np.flatnonzero(keep).tolist():
+        lane = int(passed.lanes[at[k]])
         own_rows = rows.setdefault(lane, [])
-        if lane in places:
-            own_rows.append(_between(outcome, line, lane, (places[lane], travelled)))
+        if lane in last:
+            both = [last[lane], k]
+            between = _recorded(outcome, line, lane, passed.travelled[at[both]])
+            middle = passed.t[at[both]].mean()
+            own_rows.append(between or _point_at(line, lane, z[both].mean(axis=0)[None], middle))
         own_rows.append(Inner(z[k], p[k], int(index[k]), VertexKind(kind[k])))
-        places[lane] = travelled
+        last[lane] = k
     return rows
 
 
@@ -295,15 +298,22 @@ def _pin(
     return pinned
 
 
-def _between(outcome: Traces, line: ParameterLine, lane: int, span: tuple[float, float]) -> Inner:
-    """Recorded point of a lane nearest to the middle of an interval of its length."""
+def _recorded(
+    outcome: Traces, line: ParameterLine, lane: int, span: Float[np.ndarray, " 2"]
+) -> Inner | None:
+    """Recorded point of a lane nearest to the middle of an interval of its length, if any."""
     points = outcome.points
     own = slice(*np.searchsorted(points.lanes, [lane, lane + 1]))
     inside = (points.travelled[own] >= span[0]) & (points.travelled[own] <= span[1])
-    assert inside.any(), "two events in one step are refused by the tracer"
-    off = np.abs(points.travelled[own] - 0.5 * (span[0] + span[1]))
+    if not inside.any():
+        return None
+    off = np.abs(points.travelled[own] - span.mean())
     at = own.start + int(np.argmin(np.where(inside, off, np.inf)))
-    p = line.start[lane] + points.t[at] * line.velocity[lane]
-    # counted anew: near crossings the tracer may have met round-off
-    index = int(line.structure.index(points.z[at : at + 1], p[None])[0])
-    return Inner(points.z[at], p, index, VertexKind.BETWEEN)
+    return _point_at(line, lane, points.z[at : at + 1], points.t[at])
+
+
+def _point_at(line: ParameterLine, lane: int, near: Float[np.ndarray, "1 size"], t: float) -> Inner:
+    """Regular point inside an edge, with its own index: near crossings the tracer met round-off."""
+    p, velocity = (line.start + t * line.velocity)[[lane]], line.velocity[[lane]]
+    z = settle(line.structure, near, p, velocity[:, None], (), SAFE, Held()).z
+    return Inner(z[0], p[0], int(line.structure.index(z, p)[0]), VertexKind.BETWEEN)

@@ -10,6 +10,7 @@ import numpy as np
 from equimorph.errors import InputError
 from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.lifting.edges import lift_directly, trace_rays
+from equimorph.manifold.lifting.hidden_zeros import take_back_hiding
 from equimorph.manifold.lifting.pairing import Pairing, RayMark, Rays
 from equimorph.model import Progress
 
@@ -29,6 +30,7 @@ def flood(pairing: Pairing, progress: Progress) -> None:
     """
     while not pairing.is_full:
         flood_directly(pairing, progress)
+        take_back_hiding(pairing)
         long = pairing.rays_with(RayMark.LONG)
         if len(long.points):
             _lift(pairing, long, STEPS)

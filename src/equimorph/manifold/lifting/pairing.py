@@ -89,6 +89,8 @@ class Pairing:
     """Points between two of these at which a fold of one of the sheets crosses, too."""
     tips: dict[tuple[int, int], int] = field(default_factory=dict)
     """Points of folds, by the points on both sides between which they turn sharply."""
+    looked_at: int = 0
+    """Curves that were looked at for zeros that they hide; see `take_back_hiding`."""
 
     @property
     def is_full(self) -> bool:

@@ -1,0 +1,124 @@
+"""Lifted edges on which an eigenvalue vanishes twice, although their ends do not show it.
+
+A strip between two pitchforks that is narrower than the grid is crossed by edges whose ends lie on
+both sides of it. The determinant of F_z shows it: the cubic through its values at both ends, with
+the slopes from the next vertices on the same line, falls between them. There it is computed.
+
+See docs/decisions.md, "Edges across narrow strips are recognised by the determinant".
+"""
+
+import numpy as np
+
+from equimorph.arrays import Flags, Items, Numbers, Values
+from equimorph.equilibria.determinants import determinants, hides_two_zeros
+from equimorph.equilibria.kernels import EARLY_DIP
+from equimorph.equilibria.steps import Bracket, Front, least_inside
+from equimorph.manifold.lifting.pairing import Pairing, Rays
+
+STEEP = 1.0
+"""Change of the determinant along an edge, relative to the smaller value, from which on a cubic may
+fall to half of it on the edges around: with values 1 and slopes ∓r it falls to 1 − r/4."""
+STRAIGHT = 0.98
+"""Cosine of the angle between two edges from which on they lie on one line of the grid."""
+
+BothEnds = tuple[Rays, Rays]
+"""Lifted edges, seen from their starts and from their ends."""
+
+
+def take_back_hiding(pairing: Pairing) -> None:
+    """Forget curves that hide two zeros, of those that are new; their edges need more effort."""
+    curves, rays = _new(pairing)
+    for hint in (_are_steep, _dip, _hide):
+        if len(curves) == 0:
+            return
+        some = np.flatnonzero(hint(pairing, rays))
+        curves, rays = curves[some], (rays[0].take(some), rays[1].take(some))
+    pairing.effort[rays[0].edges] = 1
+    for curve in curves.tolist():
+        pairing.forget(curve)
+
+
+def _new(pairing: Pairing) -> tuple[Numbers, BothEnds]:
+    """Curves that were lifted at once and have not been looked at, as rays from both ends."""
+    known, pairing.looked_at = pairing.looked_at, len(pairing.curves.edge)
+    curves = np.arange(known, pairing.looked_at)
+    start, end, edges = (
+        np.array(each[known:], int)
+        for each in (pairing.curves.start, pairing.curves.end, pairing.curves.edge)
+    )
+    sides = (pairing.mesh.edges[edges, 1] == pairing.points.vertex[start]).astype(int)
+    alive = pairing.rays[start, pairing.slots[edges, sides]] == curves
+    alive &= (end >= 0) & (pairing.effort[edges] == 0)
+    plain = np.flatnonzero(alive & ~np.isin(curves, list(pairing.curves.inner)))
+    rays = Rays(start, edges, sides), Rays(end, edges, 1 - sides)
+    return curves[plain], (rays[0].take(plain), rays[1].take(plain))
+
+
+def _determinants(pairing: Pairing, points: Items) -> Values:
+    """Determinants of F_z at points, nan for the number −1."""
+    numbers, place = np.unique(points, return_inverse=True)
+    at = np.maximum(numbers, 0)
+    values = determinants(pairing.setting.structure, pairing.points.z[at], pairing.points.p[at])
+    return np.asarray(np.where(numbers < 0, np.nan, values)[place])
+
+
+def _are_steep(pairing: Pairing, rays: BothEnds) -> Flags:
+    """Edges at an end of which the determinant changes much along some edge."""
+    points = np.concatenate([each.points for each in rays])
+    one, other = np.split(_determinants(pairing, points), 2)
+    much = np.abs(other - one) > STEEP * np.fmin(np.abs(one), np.abs(other))
+    steep = np.isin(points, points[np.tile(much, 2)])
+    return np.asarray(steep[: len(one)] | steep[len(one) :])
+
+
+def _dip(pairing: Pairing, rays: BothEnds) -> Flags:
+    """Where the cubic through determinants falls below half the smaller one at both ends."""
+    ends = np.stack([_determinants(pairing, each.points) for each in rays])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        scale = np.copysign(np.abs(ends).min(axis=0), ends[0])
+        start, end = ends / scale
+        before, after = (_slope(pairing, *each) / scale for each in zip(rays, ends, strict=True))
+        rise = 2.0 * (end - start)
+        slopes = (
+            np.where(np.isnan(before), rise + after, before),
+            np.where(np.isnan(after), rise - before, -after),
+        )
+        least = least_inside((start, end), slopes, np.ones(len(rise)))[1]
+    return np.asarray((least < EARLY_DIP) | (np.isnan(slopes[0]) & ~np.isnan(rise)))
+
+
+def _slope(pairing: Pairing, rays: Rays, here: Values) -> Values:
+    """Slope of the determinant, for an edge, from the next point behind its start.
+
+    It lies on the same line of the grid and on the same sheet; nan where there is none.
+    """
+    mesh = pairing.mesh
+    spans = np.diff(mesh.vertices[mesh.edges], axis=1)[:, 0]
+    spans = spans / np.abs(spans).max(axis=0)
+    vertex = mesh.edges[rays.edges, rays.sides]
+    around = pairing.incident[vertex]
+    outward = np.where(mesh.edges[around, 0] == vertex[:, None], 1.0, -1.0)
+    directions = outward[..., None] * spans[around]
+    own = np.where(rays.sides == 0, 1.0, -1.0)[:, None] * spans[rays.edges]
+    lengths, length = np.linalg.norm(directions, axis=2), np.linalg.norm(own, axis=1)
+    cosine = -(directions @ own[:, :, None])[..., 0] / (lengths * length[:, None])
+    cosine[(around < 0) | ~mesh.edges_in_use[around]] = -1.0
+    slot, every = cosine.argmax(axis=1), np.arange(len(cosine))
+    behind = np.full(len(cosine), -1)
+    curves = pairing.rays[rays.points, slot]
+    for lane in np.flatnonzero((cosine[every, slot] > STRAIGHT) & (curves >= 0)).tolist():
+        curve = int(curves[lane])
+        if curve not in pairing.curves.inner:
+            behind[lane] = pairing.other_end(curve, int(rays.points[lane]))
+    return (here - _determinants(pairing, behind)) * length / lengths[every, slot]
+
+
+def _hide(pairing: Pairing, rays: BothEnds) -> Flags:
+    """Whether the determinant vanishes inside edges, by its values there."""
+    line, one, fronts = pairing.line(rays[0]), np.ones(len(rays[0].points)), []
+    for t, side in zip((0.0 * one, one), rays, strict=True):
+        z = pairing.points.z[side.points]
+        tangent = line.advance(z, t, np.zeros_like(z), one, 0.0 * one).tangent_z
+        fronts.append(Front(z, t, tangent, one, pairing.points.index[side.points]))
+    lanes = np.arange(len(one))
+    return hides_two_zeros(line, Bracket(lanes, fronts[0], fronts[1], one, 0.0 * one, lanes))
