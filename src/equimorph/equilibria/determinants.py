@@ -56,7 +56,7 @@ def hides_two_zeros(curve: Curve, step: Bracket) -> Bool[np.ndarray, " steps"]:
 
     def value(lanes: Lanes, share: Values) -> Values:
         at = determinant(curve.take(lanes), *hermite(step.take(lanes), share))
-        return np.sign(ends[0][lanes]) * at / size[lanes]
+        return np.asarray(np.sign(ends[0][lanes]) * at / size[lanes])
 
     with np.errstate(divide="ignore", invalid="ignore"):
         middle = value(np.arange(count), np.full(count, 0.5))

@@ -110,7 +110,7 @@ def _slope(pairing: Pairing, rays: Rays, here: Values) -> Values:
         curve = int(curves[lane])
         if curve not in pairing.curves.inner:
             behind[lane] = pairing.other_end(curve, int(rays.points[lane]))
-    return (here - _determinants(pairing, behind)) * length / lengths[every, slot]
+    return np.asarray((here - _determinants(pairing, behind)) * length / lengths[every, slot])
 
 
 def _hide(pairing: Pairing, rays: BothEnds) -> Flags:
