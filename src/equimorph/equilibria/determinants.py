@@ -6,7 +6,7 @@ It costs one factorisation, and says where an eigenvalue has to be looked at; se
 import numpy as np
 
 from equimorph.array_types import Bool, Float
-from equimorph.arrays import Lanes, Parameters
+from equimorph.arrays import Lanes, Parameters, Some
 from equimorph.equilibria.curves import Curve, ParameterLine
 from equimorph.equilibria.kernels import EARLY_DIP, EARLY_NEAR
 from equimorph.equilibria.locate import hermite
@@ -54,7 +54,7 @@ def hides_two_zeros(curve: Curve, step: Bracket) -> Bool[np.ndarray, " steps"]:
     ends = [determinant(curve, front.z, front.t) for front in (step.before, step.after)]
     size = np.minimum(*np.abs(ends))
 
-    def value(lanes: Lanes, share: Values) -> Values:
+    def value(lanes: Some, share: Values) -> Values:
         at = determinant(curve.take(lanes), *hermite(step.take(lanes), share))
         return np.asarray(np.sign(ends[0][lanes]) * at / size[lanes])
 

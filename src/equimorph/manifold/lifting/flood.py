@@ -40,6 +40,7 @@ def flood(pairing: Pairing, progress: Progress) -> None:
             return
         for at in range(0, len(hard.points), CHUNK):
             trace_rays(pairing, hard.take(slice(at, at + CHUNK)))
+        pairing.looked_at = len(pairing.curves.edge)  # steps of traces are judged as they are made
 
 
 def flood_directly(pairing: Pairing, progress: Progress) -> None:

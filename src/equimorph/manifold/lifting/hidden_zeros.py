@@ -13,7 +13,7 @@ from equimorph.arrays import Flags, Items, Numbers, Values
 from equimorph.equilibria.determinants import determinants, hides_two_zeros
 from equimorph.equilibria.kernels import EARLY_DIP
 from equimorph.equilibria.steps import Bracket, Front, least_inside
-from equimorph.manifold.lifting.pairing import Pairing, Rays
+from equimorph.manifold.lifting.pairing import Pairing, RayMark, Rays
 
 STEEP = 1.0
 """Change of the determinant along an edge, relative to the smaller value, from which on a cubic may
@@ -35,7 +35,7 @@ def take_back_hiding(pairing: Pairing) -> None:
         curves, rays = curves[some], (rays[0].take(some), rays[1].take(some))
     pairing.effort[rays[0].edges] = 1
     for curve in curves.tolist():
-        pairing.forget(curve)
+        pairing.forget(curve, RayMark.HARD)
 
 
 def _new(pairing: Pairing) -> tuple[Numbers, BothEnds]:
