@@ -128,7 +128,7 @@ def test_stiffness_of_a_rod_is_an_error_of_its_loads():
     np.testing.assert_allclose(deviation.force(z, p), exact, atol=1e-12)
     assert ErringStructure(rod, Errors({"EI": 0.1, "length": 0.1})).deviations is None
     found = survival(rod.natural_state(), [{"P": 1.0}], {"EI": 0.05, "P": 0.05})
-    assert found.status == "supported"  # the bounds of general rods are sampled
+    assert found.status == "proved"
 
 
 def test_probability_has_the_bound_of_clopper_and_pearson():
