@@ -299,7 +299,7 @@ class Controller:
         return bool((np.abs(change) > STALE * spread).any())
 
     def _follows_safely(self, belief: Belief, likely: LikelyLoads, place: Bundles) -> bool:
-        return route_is_safe(place, belief.way_points, likely.under(self._goal.batch), likely)
+        return route_is_safe(place, belief.way_points, self._goal.batch, likely)
 
     def _is_goal(self, states: States) -> Flags:
         """Which states are the goal under their loads."""

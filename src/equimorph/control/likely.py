@@ -11,6 +11,7 @@ from equimorph.equilibria.soft_modes import metric_length
 from equimorph.model import position
 from equimorph.structures import States, Structure, join_states
 from equimorph.tasks.planning.network import MATCH, Demands, lift_straight
+from equimorph.tolerances import SAME_TO_ROUNDING
 
 Loads = Float[np.ndarray, " k"]
 Places = Int[np.ndarray, " d"]
@@ -107,12 +108,25 @@ class LikelyLoads:
         return self._bundles(source, to)
 
     def linked(self, source: Bundles, target: Bundles) -> Flags:
-        """Whether straight moves lead from places to places safely under each of the loads.
+        """Whether straight moves lead from places to places safely under each of the loads."""
+        return self._agree(source, self._bundles(source.states, target.states.p), target)
+
+    def onward(self, source: Bundles, at: Places, to: Float[np.ndarray, "n d"]) -> Bundles:
+        """Places after straight moves of the actuators; safe where the moves are, too."""
+        p = source.states.p.copy()
+        p[:, at] = to.repeat(source.loads, 0)
+        after = self._bundles(source.states, p)
+        if not after.safe.any():
+            return after
+        target = self.under(after.estimated)
+        return replace(target, safe=self._agree(source, after, target))
+
+    def _agree(self, source: Bundles, after: Bundles, target: Bundles) -> Flags:
+        """Whether moves to `after` are safe and lead to the same states as the loads at the target.
 
         After a jump the structure may come elsewhere, as long as it does not snap; it may happen
         anywhere on the way.
         """
-        after = self._bundles(source.states, target.states.p)
         structure = after.states.structure
         gaps = (after.states.z - target.states.z)[:, : structure.unknowns]
         apart = metric_length(structure, gaps).reshape(-1, source.loads)[:, : self.usual]
@@ -126,7 +140,7 @@ class LikelyLoads:
         """Whether places on straight moves, not far from each other, bear the jumps."""
         change = target.p - source.p
         apart = np.linalg.norm(change / source.structure.scales, axis=1)
-        between = np.maximum(np.ceil(apart / REACH).astype(int) - 1, 0)
+        between = np.maximum(np.ceil(apart / REACH - SAME_TO_ROUNDING).astype(int) - 1, 0)
         move = np.repeat(np.arange(len(source)), between)
         number = 1 + np.arange(len(move)) - np.repeat(np.cumsum(between) - between, between)
         share = number / (between[move] + 1)

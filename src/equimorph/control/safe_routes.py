@@ -12,7 +12,7 @@ from equimorph.equilibria import TraceOptions
 from equimorph.manifold import EquilibriumSet, equilibrium_set
 from equimorph.manifold.complex.kept_tables import from_cache
 from equimorph.model import names_of
-from equimorph.structures import States
+from equimorph.structures import States, join_states
 from equimorph.tasks.planning.network import (
     Pairs,
     connect,
@@ -45,7 +45,7 @@ def safe_route(
 
 
 def route_is_safe(
-    start: Bundles, way_points: Sequence[Mapping[str, float]], goal: Bundles, likely: LikelyLoads
+    start: Bundles, way_points: Sequence[Mapping[str, float]], goal: States, likely: LikelyLoads
 ) -> bool:
     """Whether straight moves over way-points lead to the goal safely under all likely loads."""
     here, ahead = start.estimated[0], goal
@@ -59,8 +59,8 @@ def route_is_safe(
         way = follow_polyline(here, np.array(rows[1:]), (), TraceOptions())
         if way.end.kind != "arrived":
             return False
-        ahead = likely.under(way.states[way.corners[1:]]).follow(goal)
-    path, legs = start.follow(ahead), np.arange(len(ahead))
+        ahead = join_states(here.structure, [way.states[way.corners[1:]], goal])
+    path, legs = start.follow(likely.under(ahead)), np.arange(len(ahead))
     return bool(likely.linked(path.take(legs), path.take(legs + 1)).all())
 
 

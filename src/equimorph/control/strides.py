@@ -48,9 +48,9 @@ class Strides:
         for share in SHARES:
             whole = share * part == 1.0
             target = there if whole else here + share * part * (there - here)
-            after, arrived = moved(state.batch, self.actuators, target[None])
-            if arrived[0] and likely.linked(place, likely.under(after))[0]:
-                return Stride(after[0], whole)
+            after = likely.onward(place, self.actuators, target[None])
+            if after.safe[0]:
+                return Stride(after.estimated[0], whole)
         return Stride(None)
 
     def away(self, state: State, likely: LikelyLoads) -> State | None:
