@@ -73,7 +73,7 @@ class Pushed(Structure):
         """∂S/∂u."""
         units = self._step * np.eye(self.unknowns)
         found = self._values(z, p, np.concatenate([units, -units, 2.0 * units, -2.0 * units]))
-        ahead, behind, twice, back = found.reshape(len(z), 4, -1).transpose(1, 0, 2)
+        ahead, behind, twice, back = found.reshape(len(z), 4, self.unknowns).transpose(1, 0, 2)
         return np.asarray((8.0 * (ahead - behind) - (twice - back)) / (12.0 * self._step))
 
     @cached_property
