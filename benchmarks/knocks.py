@@ -2,9 +2,9 @@
 
     python benchmarks/knocks.py [NUMBER] [SHARE]
 
-Each knock meets a state at a random place of a route, at rest, and gives it a kinetic energy of SHARE
-times the largest barrier of the weaker route, in a random direction of its six lowest modes. The
-structure's own equations of motion tell whether it comes back.
+Each knock meets a state at a random place of a route, at rest, and gives it a kinetic energy of
+SHARE times the larger one of the least barriers of both routes, in a random direction of its six
+lowest modes. The structure's own equations of motion tell whether it comes back.
 """
 
 import sys
@@ -77,11 +77,10 @@ def main(number=1000, share=1.0):
             generator = np.random.default_rng(0)
             scale = eset.structure.energy_scale
             gone, open_ = knock(field, route.states, energy / scale, number, generator)
-            print(
+            sys.stdout.write(
                 f"{name}, planned for {kind}: length {route.length:.3f}, least barrier "
                 f"{least[kind]:.5f}, least margin {route.states.margin.min():.4f}; energy "
-                f"{energy:.5f}: {gone:.2%} snap, {open_:.2%} undecided",
-                flush=True,
+                f"{energy:.5f}: {gone:.2%} snap, {open_:.2%} undecided\n"
             )
 
 
