@@ -64,7 +64,7 @@ def survival(
     InputError
         If the start is no stable equilibrium, or a name means no parameter and no data.
     """
-    return _Question.of(start, schedule, survive, within).answer()
+    return Question.of(start, schedule, survive, within).answer()
 
 
 @dataclass(frozen=True)
@@ -123,7 +123,7 @@ def survival_room(
     InputError
         As for `survival`, or for errors with a probability.
     """
-    asked = _Question.of(start, schedule, survive, within)
+    asked = Question.of(start, schedule, survive, within)
     if asked.errors.probability is not None:
         raise InputError(f"`survive` must be a box, without a probability; got {asked.errors}.")
     survived, is_open = asked.room()
@@ -138,7 +138,7 @@ def trial_room(
     start: State, schedule: Schedule, errors: Errors, within: Sequence[Constraint]
 ) -> float:
     """Largest multiple of a box of errors for which all trials of a schedule arrive."""
-    return _Question.of(start, schedule, errors, within).room()[0]
+    return Question.of(start, schedule, errors, within).room()[0]
 
 
 def rest_survives(
@@ -146,11 +146,11 @@ def rest_survives(
 ) -> Survival:
     """Whether a state that rests survives errors: refuted by trials, else taken to do so."""
     erring = ErringStructure(state.structure, errors_of(survive))
-    return _Question(state, np.zeros((0, len(state.p))), erring, tuple(within)).tried()
+    return Question(state, np.zeros((0, len(state.p))), erring, tuple(within)).tried()
 
 
 @dataclass(frozen=True)
-class _Question:
+class Question:
     """A schedule, and the errors that it has to survive."""
 
     start: State
@@ -165,7 +165,7 @@ class _Question:
         schedule: Schedule | Sequence[Mapping[str, float]],
         survive: Mapping[str, float] | Errors,
         within: Sequence[Constraint],
-    ) -> "_Question":
+    ) -> "Question":
         """Check what a caller asks."""
         check_start(start)
         if not start.stable:
@@ -177,10 +177,10 @@ class _Question:
     def errors(self) -> Errors:
         return self.erring.errors
 
-    def scaled(self, factor: float) -> "_Question":
+    def scaled(self, factor: float) -> "Question":
         """The same with larger or smaller errors."""
         erring = ErringStructure(self.start.structure, self.errors.scaled(factor))
-        return _Question(self.start, self.rows, erring, self.within)
+        return Question(self.start, self.rows, erring, self.within)
 
     def answer(self) -> Survival:
         """Answer by trials, or by trials and a proof."""
