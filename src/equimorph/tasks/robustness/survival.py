@@ -175,6 +175,7 @@ class Question:
 
     @property
     def errors(self) -> Errors:
+        """The errors."""
         return self.erring.errors
 
     def scaled(self, factor: float) -> "Question":
