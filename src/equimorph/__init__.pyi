@@ -257,6 +257,31 @@ from .tasks.reach.reachable_sets import (
     Reach as Reach,
 )
 
+# Design structures for control
+from .tasks.designing.design import (
+    design as design,
+    Design as Design,
+    DesignStep as DesignStep,
+)
+from .tasks.designing.front import (
+    design_front as design_front,
+    DesignFront as DesignFront,
+)
+from .tasks.designing.questions import (
+    LoadLimit as LoadLimit,
+    StateValue as StateValue,
+)
+from .tasks.designing.routes import (
+    RouteExtreme as RouteExtreme,
+)
+from .tasks.designing.bounds import (
+    DesignBound as DesignBound,
+)
+from .tasks.designing.column import (
+    strongest_column as strongest_column,
+    StrongestColumn as StrongestColumn,
+)
+
 # Map limit loads
 from .tasks.maps.limit_load import (
     limit_load_map as limit_load_map,

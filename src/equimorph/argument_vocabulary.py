@@ -107,6 +107,14 @@ CLASSES: Mapping[str, tuple[str, str]] = {
         "a descriptor, like `rod.max_curvature`",
         "descriptors, like `[rod.max_curvature]`",
     ),
+    "Extreme": ("an extreme, like `peak(descriptor)`", "extremes, like `peak(descriptor)`"),
+    "DesignBound": (
+        "a bound, like `DesignBound(lambda B: B, upper=1)`",
+        "bounds, like `[DesignBound(lambda B: B, upper=1)]`",
+    ),
+    "LoadLimit": ("a question, like `LoadLimit(state, 'q')`", "questions"),
+    "RouteExtreme": ("a question, like `RouteExtreme(...)`", "questions"),
+    "StateValue": ("a question, like `StateValue(state, peak(descriptor))`", "questions"),
     "Workers": (
         "workers with the method `map(function, chunks)`, like `cluster.dask(client)`",
         "workers",

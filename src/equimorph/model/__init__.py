@@ -40,7 +40,7 @@ from equimorph.model.parameter import (
     parameter_vector,
     position,
 )
-from equimorph.model.rebuilding import Call, Rebuilt, remember_call
+from equimorph.model.rebuilding import Call, Rebuilt, remake, remember_call
 from equimorph.model.schedule import Rates, Schedule
 from equimorph.model.spline import Spline
 from equimorph.model.workers import Workers, cut_rows, map_rows
@@ -86,6 +86,7 @@ __all__ = [
     "parameter_vector",
     "position",
     "recalled",
+    "remake",
     "remember_call",
     "worst_excess",
     "worst_relative_excess",

@@ -6,6 +6,7 @@ See docs/decisions.md, "Pickles keep the call that made an object".
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, fields, is_dataclass
 from functools import wraps
+from operator import is_
 from types import FunctionType
 from typing import Any, Self, TypeVar
 
@@ -109,3 +110,33 @@ def _functions_in(value: Any) -> Iterator[FunctionType]:
 def _field_values(record: Any) -> tuple[Any, ...]:
     """Arguments by which a dataclass was made."""
     return tuple(getattr(record, each.name) for each in fields(record))
+
+
+def remake(value: Any, swap: Callable[[Any], Any]) -> Any:
+    """The same object by the calls that made it, with arguments swapped: for another structure.
+
+    Parameters
+    ----------
+    value
+        An object that remembers its call, or lists, mappings and records of such.
+    swap
+        Returns what takes the place of an argument, or the argument itself.
+    """
+    swapped = swap(value)
+    if swapped is not value:
+        return swapped
+    if isinstance(value, Rebuilt):
+        call = value.origin_call
+        arguments, named = (remake(each, swap) for each in (call.arguments, call.named))
+        same = arguments is call.arguments and named is call.named
+        return value if same else Call(call.function, arguments, named)()
+    if isinstance(value, Mapping):
+        again = {key: remake(each, swap) for key, each in value.items()}
+        return value if all(again[key] is value[key] for key in again) else again
+    if isinstance(value, tuple | list):
+        parts = [remake(each, swap) for each in value]
+        return value if all(map(is_, parts, value)) else type(value)(parts)
+    if is_dataclass(value) and not isinstance(value, type):
+        parts = [remake(each, swap) for each in _field_values(value)]
+        return value if all(map(is_, parts, _field_values(value))) else type(value)(*parts)
+    return value

@@ -8,7 +8,7 @@ all of them as they are. The KKT system is solved for every set of functions tha
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import combinations
+from itertools import combinations, islice
 
 import numpy as np
 
@@ -66,7 +66,9 @@ class _Active:
         return QuadraticStep(x[0, :d], weights, multipliers) if regular[0] else None
 
 
-def passes_near(programme: Programme, start: SetPoints, reach: float) -> list[CriticalPoint]:
+def passes_near(
+    programme: Programme, start: SetPoints, reach: float, like: CriticalPoint | None = None
+) -> list[CriticalPoint]:
     """Passes near a point, the nearest first.
 
     Parameters
@@ -77,11 +79,17 @@ def passes_near(programme: Programme, start: SetPoints, reach: float) -> list[Cr
         One point.
     reach
         Size of the cells around it, in the metric and scaled parameters.
+    like
+        A pass of a similar problem: the same functions are then held, right or not.
     """
     start, found = project_onto_set(programme.setting, start.z, start.p, start.rows)
     if not found[0]:
         return []
-    lanes = list(_possible(Iterate.at(programme, start).expansion, AROUND * reach))[:MOST]
+    if like is None:
+        possible = _possible(Iterate.at(programme, start).expansion, AROUND * reach)
+        lanes = list(islice(possible, MOST))
+    else:
+        lanes = [_Active(*(tuple(each.tolist()) for each in like.binding))]
     here, ended = start.take(np.zeros(len(lanes), int)), list[CriticalPoint]()
     last = np.full(len(lanes), np.inf)
     for _ in range(ITERATIONS):
@@ -105,7 +113,7 @@ def passes_near(programme: Programme, start: SetPoints, reach: float) -> list[Cr
         last = last[near]
         if not lanes:
             break
-    passes = [each for each in ended if _holds(programme, each)]
+    passes = [each for each in ended if like is not None or _holds(programme, each)]
     return sorted(passes, key=lambda each: float(_distances(programme, each.point, start)[0]))
 
 

@@ -66,12 +66,18 @@ class Passing:
         States over the pass that is highest on the way, which obey it; None if none is known.
     way
         States from start to goal along the lowest way over the mesh, which obey it.
+    point
+        The pass with the conditions that hold there, if the bottleneck is one.
+    reach
+        Size of the cells around it.
     """
 
     bottleneck: Bottleneck
     bound: Constraint
     over: States | None
     way: States
+    point: CriticalPoint | None = None
+    reach: float = 0.0
 
 
 def find_bottleneck(
@@ -257,14 +263,17 @@ class _Search:
         highest = float(level.max(initial=-np.inf))
         facet = int(way[level.argmax()]) if len(way) else -1
         found = self.passes.get(facet)
-        if highest <= top + SAME_VALUE * size:
+        at_end = highest <= top + SAME_VALUE * size
+        if at_end:
             bottleneck = self._end(top)
         else:
             bottleneck = self._vertex(facet) if found is None else self._pass(found[0])
         room = self._room(self.extreme.sign * bottleneck.value, size)
         over = None if found is None else self._over(*found, room)
         bound = self.extreme.bound(bottleneck.value, room)
-        return Passing(bottleneck, bound, over, self._states_along(way, facet, over, bound))
+        point, reach = (None, 0.0) if found is None or at_end else found
+        way_over = self._states_along(way, facet, over, bound)
+        return Passing(bottleneck, bound, over, way_over, point, reach)
 
     def _states_along(
         self, way: Items, facet: int, over: States | None, bound: Constraint

@@ -1,0 +1,1 @@
+"""Structures chosen so that a task becomes possible or better."""
