@@ -22,7 +22,8 @@ def first_critical_point(column, ends, direction):
 
 def test_a_free_column_is_a_third_stronger():
     """[Keller1960]_: P = 4/3 · π²/4 for clamped–free ends, similar sections and equal volume."""
-    column = em.strongest_column("clamped-free", 32)
+    with unchecked():
+        column = em.strongest_column("clamped-free", 32)
     assert column.load / column.uniform == pytest.approx(4.0 / 3.0, abs=1e-6)
     assert column.uniform == pytest.approx(np.pi**2 / 4.0, rel=2e-8)
     assert column.multiplicity == 1
@@ -35,7 +36,8 @@ def test_a_free_column_is_a_third_stronger():
 @pytest.mark.slow
 def test_between_clamps_two_modes_coincide():
     """The branch point is multiple: both loads are equal up to the barrier's last weight."""
-    column = em.strongest_column("clamped-clamped", 64)
+    with unchecked():
+        column = em.strongest_column("clamped-clamped", 64)
     assert column.load == pytest.approx(CLAMPED_CLAMPED, abs=2e-4)
     assert column.multiplicity == 2
     found = first_critical_point(column, ("clamped", em.End(x="free")), (-1.0, 0.0))

@@ -169,7 +169,7 @@ class _Elements:
         basis = self._allowed(mean)
         return np.concatenate(rows) @ basis, basis.T @ mass @ basis, np.concatenate(shares)
 
-    def _allowed(self, mean: Vector) -> Float[np.ndarray, "size n"]:
+    def _allowed(self, mean: Float[np.ndarray, " size"]) -> Float[np.ndarray, "size n"]:
         """Slopes that vanish at clamps and, between two of them, in the mean."""
         unit = np.eye(len(mean))
         if self.supports == "clamped-free":
