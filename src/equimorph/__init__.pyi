@@ -261,6 +261,8 @@ from .tasks.reach.reachable_sets import (
 from .tasks.designing.design import (
     design as design,
     Design as Design,
+)
+from .tasks.designing.search import (
     DesignStep as DesignStep,
 )
 from .tasks.designing.front import (

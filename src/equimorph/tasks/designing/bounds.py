@@ -15,6 +15,7 @@ from equimorph.tasks.designing.routes import RouteExtreme
 
 Asked = StateValue | LoadLimit | RouteExtreme
 Function = Callable[..., Any]
+Numbers = Float[np.ndarray, " m"]
 
 DIFFERENCE = 1e-6
 """Step of differences of functions of the variables, relative to the ranges of these."""
@@ -97,11 +98,11 @@ class VariableBounds:
     family: DesignFamily
     bounds: tuple[DesignBound, ...]
 
-    def equal(self, x: Vector) -> Vector:
+    def equal(self, x: Vector) -> Numbers:
         """What must vanish."""
         return self._join([v - b.lower for b, v in self._values(x) if b.lower == b.upper])
 
-    def above(self, x: Vector) -> Vector:
+    def above(self, x: Vector) -> Numbers:
         """What must not be negative."""
         parts = []
         for bound, value in self._values(x):
@@ -121,16 +122,16 @@ class VariableBounds:
         parts = np.concatenate([np.abs(self.equal(x)), -self.above(x)])
         return float(parts.max(initial=0.0))
 
-    def _values(self, x: Vector) -> list[tuple[DesignBound, Vector]]:
+    def _values(self, x: Vector) -> list[tuple[DesignBound, np.ndarray]]:
         values: Mapping[str, Any] = self.family.values(x)
         return [(each, _numbers(each.of, values)) for each in self.bounds]
 
     @staticmethod
-    def _join(parts: list[Vector]) -> Vector:
+    def _join(parts: list[np.ndarray]) -> np.ndarray:
         return np.concatenate([np.zeros(0), *parts])
 
 
-def _numbers(function: Any, values: Mapping[str, Any]) -> Vector:
+def _numbers(function: Any, values: Mapping[str, Any]) -> np.ndarray:
     found = np.asarray(function(**values), float).ravel()
     if not np.isfinite(found).all():
         raise InputError(f"`of` must return finite numbers; got {found} at {dict(values)}.")

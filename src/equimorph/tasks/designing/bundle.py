@@ -8,7 +8,7 @@ import numpy as np
 from scipy.optimize import minimize
 
 from equimorph.array_types import Float
-from equimorph.tasks.designing.bounds import Asked, DesignBound, VariableBounds
+from equimorph.tasks.designing.bounds import Asked, DesignBound, Numbers, VariableBounds
 from equimorph.tasks.designing.family import DesignFamily, Vector
 from equimorph.tasks.designing.pieces import Piece, follow_piece
 from equimorph.tasks.designing.questions import Answer
@@ -150,7 +150,7 @@ class Bundle:
             bounds=[*zip(low, high, strict=True), (None, None), (0.0, slack)],
             options={"maxiter": STEPS, "ftol": 0.1 * self.problem.tolerance},
         )  # fmt: skip
-        return np.clip(found.x[:k], low, high)
+        return np.asarray(np.clip(found.x[:k], low, high))
 
     def excess(self, x: Vector) -> float:
         """Largest excess of bounded pieces over their levels, relative to the size of these."""
@@ -202,7 +202,7 @@ class Bundle:
         ]
         return rows + bounded
 
-    def _rows(self, y: Vector) -> Vector:
+    def _rows(self, y: Vector) -> Numbers:
         rows = [(level - piece.values) / size for piece, level, size, _ in self._all_at(y)]
         return np.concatenate(rows)
 

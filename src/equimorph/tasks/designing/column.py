@@ -23,6 +23,7 @@ from equimorph.structures.rod.discretisation import reference_element
 Supports = Literal["clamped-free", "clamped-clamped"]
 Matrix = Float[np.ndarray, "n n"]
 Vector = Float[np.ndarray, " n"]
+Areas = Float[np.ndarray, " m"]
 
 DEGREE = 4
 """Of the deflection's slope on each element."""
@@ -180,15 +181,15 @@ class _Elements:
     def volume(self) -> Vector:
         """Weights of the areas at the knots in the volume."""
         h = np.diff(self.knots)
-        return 0.5 * (np.append(h, 0.0) + np.append(0.0, h))
+        return np.asarray(0.5 * (np.append(h, 0.0) + np.append(0.0, h)))
 
-    def stiffness(self, area: Vector) -> Matrix:
+    def stiffness(self, area: Areas) -> Matrix:
         """K(a)."""
         rows, _, shares = self._tables
         scaled = rows * (shares @ area)[:, None]
         return np.asarray(scaled.T @ scaled)
 
-    def loads(self, area: Vector, number: int) -> Vector:
+    def loads(self, area: Areas, number: int) -> Vector:
         """Lowest buckling loads."""
         chosen = (0, number - 1)
         found = eigh(

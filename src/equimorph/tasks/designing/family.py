@@ -67,7 +67,7 @@ class DesignFamily:
     @property
     def start(self) -> Vector:
         """Scaled variables at the start."""
-        return (self.given - self.low) / self.width
+        return np.asarray((self.given - self.low) / self.width)
 
     def values(self, x: Vector) -> dict[str, Any]:
         """Variables by name: numbers, or arrays where the bounds are arrays."""

@@ -88,7 +88,7 @@ def design_front(
     search = DesignSearch(other, rebuilds)
     last = search.run(ended[0].x, _swapped(ended[0]))
     levels = [second.sign * each.answers[k].value for each, k in ((ended[0], -1), (last[0], 0))]
-    for level in np.linspace(*levels, points)[1:-1].tolist():
+    for level in np.linspace(levels[0], levels[1], points)[1:-1].tolist():
         bounded = replace(problem, within=(*tuple(within), _bound(second, level)))
         found.append(_between(bounded, rebuilds, found[-1][1]))
     found.append((report(search, last), _swapped(last[0])))
