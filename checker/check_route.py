@@ -140,33 +140,48 @@ class Jet:
     __radd__, __rmul__ = __add__, __mul__
 
 
-# Energies: groups of equal terms in local variables Ay + b, or quadratic forms (Ay)ᵀK(Ay)/2.
+# Energies: groups of equal terms in local variables A(y, 1), or quadratic forms xᵀKx/2 of these.
 
 
 def rod(data, size, count):
-    """θᵀKθ/2 + Σ (μmᵢ - qRᵢ) sin θᵢ + λmᵢ cos θᵢ - λν; p = (Θ, Δ, q, ν), ends Δ + Θ and Δ - Θ."""
-    stiffness, m, loads = (np.array(data[each]) for each in ("stiffness", "weights", "loads"))
-    y, (_, order, _) = np.eye(size + count), stiffness.shape
-    first, last = y[size + 1] + y[size], y[size + 1] - y[size]
-    angles = np.concatenate([[first], y[: size - 2], [last]])
-    elements = [angles[e * (order - 1) :][:order] for e in range(len(stiffness))]
-    span = np.zeros((size + count, size + count))
-    span[size - 2, -1] = span[-1, size - 2] = -1.0
-    local = np.stack([angles, *(np.tile(y[at], (len(m), 1)) for at in (-6, -5, -2))], axis=1)
+    """θᵀKθ/2 - θᵀSw + Σ (N - γ(N + T)²/2) + wᵀQw/2, N = a sin θ + b cos θ; w = (multipliers, p, 1).
 
-    def node(theta, along, across, q):
-        return (across * m + q * -loads) * theta.of("sin") + along * m * theta.of("cos")
+    θ at unknown nodes are the first entries of z, at prescribed ends rows of w; a, b, T as well.
+    """
+    t = {name: np.array(each) for name, each in data.items() if name != "kind"}
+    y, (scalars, nodes), order = np.eye(size + count + 1), t["slope"].shape, t["stiffness"].shape[1]
+    unknowns, w, angles = len(y) - scalars, y[len(y) - scalars :], np.zeros((nodes, len(y)))
+    angles[[0, -1]] = t["turned"] @ w
+    angles[t["first"] :][:unknowns] = y[:unknowns]
+    elements = [angles[e * (order - 1) :][:order] for e in range(len(t["stiffness"]))]
+    work = np.zeros((nodes + scalars, nodes + scalars))
+    work[:nodes, nodes:], work[nodes:, :nodes] = -t["slope"].T, -t["slope"]
+    work[nodes:, nodes:] = t["quadratic"]
+    fields = [t[name].T @ w for name in ("sine", "cosine", "tension")]
 
-    return [(np.array(elements), stiffness), (y[None], span[None]), (local, 0.0, node)]
+    def point(theta, a, b, pull):
+        normal = a * theta.of("sin") + b * theta.of("cos")
+        return normal + (normal + pull) * (normal + pull) * (-0.5 * t["softness"])
+
+    return [
+        (np.array(elements), t["stiffness"]),
+        (np.concatenate([angles, w])[None], work[None]),
+        (np.stack([angles[t["points"]], *fields], axis=1), point),
+    ]
+
+
+def constant(size):
+    """The variables themselves, and no constant."""
+    return np.eye(size, size + 1)
 
 
 def truss(data, size, count):
     """EA l₀ ε²/2 with Green (l²/l₀² - 1)/2 or engineering strain l/l₀ - 1; less work of loads."""
-    y, stiffness, ends = np.eye(size + count), np.array(data["stiffness"]), np.array(data["ends"])
-    moves = np.concatenate([y[:size], np.zeros((1, size + count))])  # the last one is held
+    y, stiffness, ends = constant(size + count), np.array(data["stiffness"]), np.array(data["ends"])
+    moves = np.concatenate([y[:size], np.zeros((1, y.shape[1]))])  # the last one is held
     rest, pulls = np.array(data["rates"]) @ y[size:], np.array(data["pulls"])
     local = np.concatenate([moves[ends[:, 1]] - moves[ends[:, 0]], rest[:, None]], axis=1)
-    built = np.column_stack([np.array(data["chords"]), data["lengths"]])
+    local[:, :, -1] = np.column_stack([np.array(data["chords"]), data["lengths"]])
     work = np.zeros((size + count, size + count))
     work[size:, :size], work[:size, size:] = -pulls, -pulls.T
 
@@ -178,7 +193,7 @@ def truss(data, size, count):
             strain = squared.of("sqrt") * shorter + -1.0
         return x[-1] * strain * strain * (0.5 * stiffness)
 
-    return [(local, built, bar), (y[None], work[None])]
+    return [(local, bar), (y[None], work[None])]
 
 
 def spring(data, size, count):
@@ -189,7 +204,7 @@ def spring(data, size, count):
         strain = longer + -1.0
         return k * strain * strain * 0.5 + force * longer * delta.of("sin")
 
-    return [(np.eye(4)[None], 0.0, energy)]
+    return [(constant(4)[None], energy)]
 
 
 OPERATIONS = {
@@ -218,7 +233,7 @@ def program(data, size, count):
             done.append(OPERATIONS[name](*given) if name in OPERATIONS else given[0].of(name))
         return done[-1]
 
-    return [(np.eye(size + count)[None], 0.0, energy)]
+    return [(constant(size + count)[None], energy)]
 
 
 KINDS = {"rod": rod, "truss": truss, "spring": spring, "program": program}
@@ -232,16 +247,17 @@ def derivatives(groups, y):
     """Gradient and Hessian of the energy over a box of y."""
     size = len(y.low)
     gradient, hessian = Interval(np.zeros(size)), Interval(np.zeros((size, size)))
-    for forms, constant, *energy in groups:
-        terms, k, _ = forms.shape
-        x = reshape(dot(forms.reshape(-1, size), y[:, None]), terms, k)
-        if energy:
-            x, none = x + constant, Interval(np.zeros((terms, k, k)))
+    for local, energy in groups:
+        terms, k, _ = local.shape
+        forms = local[:, :, :-1]
+        x = reshape(dot(forms.reshape(-1, size), y[:, None]), terms, k) + local[:, :, -1]
+        if callable(energy):
+            none = Interval(np.zeros((terms, k, k)))
             units = (Interval(np.tile(each, (terms, 1))) for each in np.eye(k))
-            jet = energy[0](*(Jet(x[:, i], unit, none) for i, unit in enumerate(units)))
+            jet = energy(*(Jet(x[:, i], unit, none) for i, unit in enumerate(units)))
             g, h = jet.gradient, jet.hessian
         else:
-            g, h = dot(constant, x[:, :, None]), Interval(constant)
+            g, h = dot(energy, x[:, :, None]), Interval(energy)
         flat, half = forms.reshape(-1, size).T, dot(forms.transpose(0, 2, 1), h)
         half = reshape(half.each(lambda x: x.transpose(0, 2, 1)), -1, size)
         gradient = gradient + dot(flat, reshape(g, -1, 1))[:, 0]

@@ -63,10 +63,18 @@ def bead():
     ).natural_state()  # fmt: skip
 
 
+def stretchable():
+    return em.Rod(
+        axial=100.0, ends=("clamped", "free"), curvature=0.5, elements=2, degree=5,
+        loads={"P": em.PointForce(1.0)},
+    ).natural_state()  # fmt: skip
+
+
 CASES = {
     "rod": (arch, [{"Theta": 1.03}, {"Delta": 0.02}]),
     "green truss": (lambda: shallow("green"), [{"P": 3e-4}, {"a": 0.003}]),
     "engineering truss": (lambda: shallow("engineering"), [{"P": 2e-4}]),
+    "stretchable rod": (stretchable, [{"P": 0.01}]),
     "spring": (lambda: em.Spring().natural_state(x_l=0.8), [{"F": 0.01}]),
     "formula": (formula, [{"F": 0.05}]),
     "constrained formula": (bead, [{"F": 0.02}]),
@@ -147,7 +155,7 @@ def leave_gap(data, tubes, k, generator):
 
 
 def change_structure(data, tubes, k, generator):
-    table = {"rod": "loads", "truss": "stiffness"}[data["structure"]["kind"]]
+    table = {"rod": "sine", "truss": "stiffness"}[data["structure"]["kind"]]
     data["structure"][table] = (1.05 * np.array(data["structure"][table])).tolist()
 
 

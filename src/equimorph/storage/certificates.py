@@ -38,7 +38,7 @@ def write_certificate(proof: Proof, path: str | Path) -> Path:
     ------
     InputError
         If nothing is proved, for a structure whose energy is not written in plain numbers (those
-        of springs, trusses, clamped rods and formulas are), or for another ending.
+        of springs, trusses, planar rods and formulas are), or for another ending.
 
     Examples
     --------
@@ -53,7 +53,7 @@ def write_certificate(proof: Proof, path: str | Path) -> Path:
     if energy is None:
         raise InputError(
             f"`proof` must be that of a structure whose energy is written in numbers (spring, "
-            f"truss, clamped rod, usual formulas); got a {structure.kind}."
+            f"truss, planar rod, usual formulas); got a {structure.kind}."
         )
     certificate = {
         "format": FORMAT,

@@ -112,13 +112,6 @@ class Structure(Rebuilt, Equations):
         head = ("parameter", "role", "default", "unit")
         return html_table(f"{type(self).__name__} with {self.size} unknowns", head, rows)
 
-    def plain_energy(self) -> dict[str, Any] | None:
-        """Energy in plain numbers, from which others compute F; None where none are written.
-
-        Route certificates carry it; ``checker/check_route.py`` says how each kind is read.
-        """
-        return None
-
     @abstractmethod
     def identity(self) -> dict[str, Any]:
         """Return the kind, and the arguments of the constructor as plain data, by their names."""

@@ -4,6 +4,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -108,6 +109,13 @@ class Equations(ABC):
         knows no bounds.
         """
         del z, p
+        return None
+
+    def plain_energy(self) -> dict[str, Any] | None:
+        """Energy in plain numbers, from which others compute F; None where none are written.
+
+        Route certificates carry it; ``checker/check_route.py`` says how each kind is read.
+        """
         return None
 
     @abstractmethod

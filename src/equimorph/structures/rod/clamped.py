@@ -30,7 +30,7 @@ from equimorph.structures.rod.clamped_kernels import advance_lanes
 from equimorph.structures.rod.discretisation import Mesh
 from equimorph.structures.rod.fields import ClampedFields
 from equimorph.structures.rod.inertia import inextensible_force, inextensible_inertia
-from equimorph.structures.rod.mechanics import PlanarMechanics
+from equimorph.structures.rod.mechanics import PlanarMechanics, plain_rod
 from equimorph.structures.rod.profiles import LoadShape
 from equimorph.structures.rod.units import FOUR_PI_SQUARED
 
@@ -149,10 +149,17 @@ class ClampedMechanics(PlanarMechanics):
         return _enclose(self, z, p)
 
     def plain_energy(self) -> dict[str, Any]:
-        """Tables of the energy: K of each element, m and R."""
-        tables = {"stiffness": self.layout.stiffness, "weights": self.mesh.weights}
-        return {"kind": "rod", **{key: each.tolist() for key, each in tables.items()},
-                "loads": self.loads.tolist()}  # fmt: skip
+        """Tables of the energy, as those of `RodModel`: y = (λ, μ, Θ, Δ, q, ν, 1)."""
+        nodes, scalars = self.unknowns + 2, self.constraints + PARAMETERS + 1
+        sines, cosines, nothing = np.zeros((3, scalars, nodes))
+        sines[1], sines[4], cosines[0] = self.mesh.weights, -self.loads, self.mesh.weights
+        turned, span = np.zeros((2, scalars)), np.zeros((scalars, scalars))
+        turned[:, 2], turned[:, 3], span[[0, 5], [5, 0]] = (1.0, -1.0), 1.0, -1.0
+        return plain_rod(
+            stiffness=self.layout.stiffness, turned=turned, quadratic=span, slope=nothing,
+            points=np.arange(nodes), sine=sines, cosine=cosines, tension=nothing,
+            softness=np.zeros(nodes), first=np.ones((), int),
+        )  # fmt: skip
 
     def effort(self, z: Lanes, p: Parameters) -> Parameters:
         """∂L/∂(Θ, Δ, q, ν): actuator couples, ∫Qy, −λ."""

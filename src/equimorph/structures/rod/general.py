@@ -1,6 +1,7 @@
 """PlanarMechanics of general rods: energy, residual, derivatives and solves in batches."""
 
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -26,7 +27,7 @@ from equimorph.structures.rod.general_enclosure import enclose_rod
 from equimorph.structures.rod.general_kernels import linearise_lanes, second_lanes
 from equimorph.structures.rod.general_step_kernels import advance_lanes
 from equimorph.structures.rod.inertia import following, moved_places, place_derivatives
-from equimorph.structures.rod.mechanics import LARGEST_TAIL, PlanarMechanics
+from equimorph.structures.rod.mechanics import LARGEST_TAIL, PlanarMechanics, plain_rod
 from equimorph.structures.rod.model import RodModel, pack_tables
 from equimorph.structures.rod.pressure import EnclosedArea, lower_triangle
 from equimorph.structures.rod.symmetry import symmetries
@@ -288,6 +289,16 @@ class GeneralMechanics(JointEquations, PlanarMechanics):
         if self._area is not None:
             return None
         return enclose_rod(self.model, self.layout.assembled, self.unknown_nodes, z, p)
+
+    def plain_energy(self) -> dict[str, Any] | None:
+        """Tables of the model; None for rods under pressure."""
+        model = self.model
+        return None if self._area is not None else plain_rod(
+            stiffness=self.layout.stiffness, turned=model.turned, quadratic=model.quadratic,
+            slope=model.slope, points=self.mesh.element_nodes.ravel(), sine=model.sine,
+            cosine=model.cosine, tension=model.tension, softness=model.softness,
+            first=np.array(self.unknown_nodes.start),
+        )  # fmt: skip
 
     def solver(
         self, parts: tuple[np.ndarray, ...], z: Lanes, p: Parameters, shift: Shift = None

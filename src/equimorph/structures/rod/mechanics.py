@@ -19,6 +19,11 @@ LARGEST_TAIL = 1e-3
 """Highest Legendre coefficients of θ, in radians, of an element that represents its part."""
 
 
+def plain_rod(**tables: np.ndarray) -> dict[str, Any]:
+    """Tables of the energy of a planar rod in plain numbers; see `Equations.plain_energy`."""
+    return {"kind": "rod", **{name: each.tolist() for name, each in tables.items()}}
+
+
 class RodMechanics(Equations):
     """Energy, residual, derivatives and solves of a discretised rod in batches of lanes.
 

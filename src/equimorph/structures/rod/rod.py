@@ -243,9 +243,8 @@ class Rod(Described):
         return value
 
     def plain_energy(self) -> dict[str, Any] | None:
-        """Tables of the clamped rod."""
-        made = self.mechanics
-        return made.plain_energy() if isinstance(made, ClampedMechanics) else None
+        """Tables of the energy."""
+        return self.mechanics.plain_energy()
 
     def identity(self) -> dict[str, Any]:
         """Kind, resolution, and everything that differs from the default arch."""
