@@ -57,14 +57,24 @@ def design_front(
 
     Parameters
     ----------
-    family, variables, within, tolerance
-        As for `design`.
+    family
+        Structure of the variables, by their names.
+    variables
+        Bounds (low, high) of each variable, or with the start (low, high, start).
     objectives
         Two questions.
+    within
+        Bounds that all designs obey.
     points
         Number of designs, both ends among them.
+    tolerance
+        Relative change of a value that counts as none; positive.
     rebuilds
         Most designs that are judged for each of them.
+
+    Returns
+    -------
+    The front; a single design where the first question has no answer at the start.
 
     Raises
     ------
