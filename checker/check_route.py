@@ -338,8 +338,16 @@ def check(certificate):
 
 
 if __name__ == "__main__":
+    if len(sys.argv) != 2:
+        print("usage: check_route.py CERTIFICATE", file=sys.stderr)
+        sys.exit(2)
     try:
         with open(sys.argv[1], encoding="utf-8") as file, np.errstate(all="ignore"):
             print("accepted:", check(json.load(file)))
-    except (ValueError, KeyError, IndexError, TypeError) as error:
+    except OSError as error:
+        print(f"{sys.argv[1]} cannot be read: {error.strerror}", file=sys.stderr)
+        sys.exit(2)
+    except KeyError as error:
+        sys.exit(f"refused: {error} is missing")
+    except (ValueError, IndexError, TypeError, AttributeError) as error:
         sys.exit(f"refused: {error}")
