@@ -91,7 +91,7 @@ class Things:
             em.Box: em.Box(x_l=(0.6, 1.3), F=(-0.5, 0.5)), em.LimitLoad: self.limit,
             em.LimitLoadMap: self.map, em.Route: self.route, em.Path: self.path,
             em.TraceOptions: em.TraceOptions(), em.SamplingOptions: em.SamplingOptions(),
-            em.Disc: em.Disc((0.0, 0.0), 1.0), em.charts.Rule: em.lowest(angle),
+            em.LoadLimit: em.LoadLimit(self.state, "F"), em.Disc: em.Disc((0.0, 0.0), 1.0), em.charts.Rule: em.lowest(angle),
             int: 2, float: 0.5, bool: False, str: "angle",
         }  # fmt: skip
         if kind in made:
@@ -136,6 +136,8 @@ NAMED: Mapping[str, Sequence[Any]] = {
     **dict.fromkeys(("distance", "reach"), NEGATIVE),
     **dict.fromkeys(("starts", "runs", "trials", "checks", "samples", "count"), (10**15, 10**400)),
 }
+ANY_NAME = {"limits", "nominal", "sizes"}
+"""Arguments whose names are looked up later, in a structure."""
 UNBOUNDED = {"lower", "upper", "margin", "period"}
 
 
@@ -189,7 +191,7 @@ def wrong_mappings(name: str, kinds: Sequence[Any], things: Things) -> Iterator[
             key = things.spring.angle if em.Descriptor in flat(keys) else "F"
             yield from ({key: value} for value in ("0.5", 1j, np.nan, np.inf, [0.1], object()))
             yield from ([("F", 0.1)], {things.state: 0.1})
-            yield from [{"no such name": 0.1}] if name not in ("limits", "nominal") else []
+            yield from [{"no such name": 0.1}] if name not in ANY_NAME else []
 
 
 def of_another_structure(kinds: Sequence[Any], things: Things) -> Iterator[OfAnother]:

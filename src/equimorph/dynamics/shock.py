@@ -174,6 +174,10 @@ def least_shock(
     if not used.damping > 0.0:
         raise InputError("`settings` must have a damping; got none, and nothing comes to rest.")
     structure = state.structure
+    if kick is not None:
+        if not kick:
+            raise InputError("`kick` must name at least one parameter; got none.")
+        parameter_vector(structure.parameters, kick, state.p)
     slope = np.zeros(0) if at is None else _slope(state, at)
     network = network or transition_network(structure, state.parameters)
     barrier = network.barrier(state)

@@ -64,7 +64,7 @@ class StrongestColumn:
     supports: Supports
     s: Vector
     area: Vector
-    loads: Vector
+    loads: Float[np.ndarray, " modes"]
     uniform: float
     steps: int
 
