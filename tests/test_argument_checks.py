@@ -91,7 +91,8 @@ class Things:
             em.Box: em.Box(x_l=(0.6, 1.3), F=(-0.5, 0.5)), em.LimitLoad: self.limit,
             em.LimitLoadMap: self.map, em.Route: self.route, em.Path: self.path,
             em.TraceOptions: em.TraceOptions(), em.SamplingOptions: em.SamplingOptions(),
-            em.LoadLimit: em.LoadLimit(self.state, "F"), em.Disc: em.Disc((0.0, 0.0), 1.0), em.charts.Rule: em.lowest(angle),
+            em.LoadLimit: em.LoadLimit(self.state, "F"),
+            em.Disc: em.Disc((0.0, 0.0), 1.0), em.charts.Rule: em.lowest(angle),
             int: 2, float: 0.5, bool: False, str: "angle",
         }  # fmt: skip
         if kind in made:

@@ -38,6 +38,17 @@ rates = {{ x_l = 0.1, F = 0.05 }}
 name = "several"
 alternatives = 2
 {ENDS}
+[[route]]
+name = "surviving"
+survive = {{ x_l = 0.01 }}
+start = {{ at = {{ x_l = 0.8, F = 0.0 }}, highest = "angle" }}
+goal = {{ at = {{ x_l = 0.9, F = 0.0 }}, highest = "angle" }}
+[[route]]
+name = "probable"
+survive = {{ F = 0.005 }}
+probability = 0.99
+start = {{ at = {{ x_l = 0.8, F = 0.0 }}, highest = "angle" }}
+goal = {{ at = {{ x_l = 0.9, F = 0.0 }}, highest = "angle" }}
 """
 
 
@@ -110,6 +121,16 @@ def test_routes_come_from_the_folder_when_asked_again(run):
         run[0].of("route")["several"][1].length, rel=0, abs=0
     )
     assert again.of("route")["snapping"][0].snaps[0].landed
+    for name in ("surviving", "probable"):
+        known, read = (each.of("route")[name][0].survival for each in (run[0], again))
+        assert repr(read) == repr(known)
+        assert np.array_equal(read.offsets, known.offsets)
+
+
+def test_what_survives_errors_is_told(run):
+    told = page(run[1])
+    assert "Survives errors x_l ± 0.01: supported." in told  # the set has a constraint
+    assert "Survives errors F ~ 0.005: probable (1000 of 1000 random trials arrived" in told
 
 
 @pytest.mark.parametrize(

@@ -142,8 +142,8 @@ def _survival(route: Route) -> str:
     found = route.survival
     if found is None:
         return ""
-    shown = f": {found.statement}" if found.proof is None else ""
-    return f" Survives {found.errors}, **{found.status}**{shown}."
+    shown = f" ({found.statement})" if found.proof is None else ""
+    return f" Survives errors {found.errors!s}: {found.status}{shown}."
 
 
 def _cost(route: Route) -> str:

@@ -77,7 +77,7 @@ def judged(route: Route, ends: Ends, demands: Demands, errors: Given) -> Route:
     found = survival(ends[0], route.schedule, errors, within=demands.constraints)
     if found.survives:
         return replace(route, survival=found)
-    why = f"it is not shown to survive {found.errors}: {found.why}"
+    why = f"it is not shown to survive errors {found.errors}: {found.why}"
     return replace(route, status="refused", why=why, survival=found)
 
 

@@ -92,12 +92,15 @@ class Errors:
 
     def __repr__(self) -> str:
         """Sizes, and the probability."""
-        sign = "±" if self.probability is None else "~"
-        words = ", ".join(f"{name} {sign} {size:g}" for name, size in self.sizes.items())
         asked = (
             "" if self.probability is None else f": {self.probability:g} in {self.trials} trials"
         )
-        return f"Errors({words}{asked})"
+        return f"Errors({self}{asked})"
+
+    def __str__(self) -> str:
+        """Half widths, or standard deviations."""
+        sign = "±" if self.probability is None else "~"
+        return ", ".join(f"{name} {sign} {size:g}" for name, size in self.sizes.items())
 
     @property
     def widths(self) -> Float[np.ndarray, " names"]:

@@ -125,7 +125,7 @@ def survival_room(
     """
     asked = Question.of(start, schedule, survive, within)
     if asked.errors.probability is not None:
-        raise InputError(f"`survive` must be a box, without a probability; got {asked.errors}.")
+        raise InputError(f"`survive` must be a box, without a probability; got {asked.errors!r}.")
     survived, is_open = asked.room()
     proved = survived if survived > 0.0 and asked.proves(survived) else 0.0
     if survived > 0.0 and proved == 0.0:
