@@ -17,9 +17,10 @@ paper: $(INSTALLED)
 test: $(INSTALLED)
 	$(QUIET_THREADS) $(BIN)/python -m pytest -n 2 --dist worksteal -m "not slow"
 
-# `make test-slow TENTH=3` runs a tenth of them; TENTH is any number, its last digit counts.
+# `make test-slow TENTH=3` runs a tenth of them; TENTH is any number, its last digit counts. They
+# repeat with more cases what fast tests do, whose shapes are checked.
 test-slow: $(INSTALLED)
-	$(QUIET_THREADS) $(BIN)/python -m pytest -n 2 --dist worksteal -m slow $(if $(TENTH),--tenth $(TENTH))
+	EQUIMORPH_SHAPES=unchecked $(QUIET_THREADS) $(BIN)/python -m pytest -n 2 --dist worksteal -m slow $(if $(TENTH),--tenth $(TENTH))
 
 lint: $(INSTALLED)
 	$(BIN)/ruff check .

@@ -5,6 +5,7 @@ EQUIMORPH_SHAPES=unchecked leaves the checks out; see `typecheck`.
 
 import os
 import sys
+from collections.abc import Generator
 from pathlib import Path
 
 import pytest
@@ -26,6 +27,9 @@ if os.environ.get("EQUIMORPH_SHAPES", "checked") != "unchecked":
     install()
 
 TENTHS = 10
+END_TO_END = ("cli", "explorer", "paper", "plotting", "study")
+"""Folders of tests that run what others test piece by piece, with the checks: here these only cost
+time."""
 
 collect_ignore = ["typing/uses.py"]
 """Read by type checkers, never run: half of its lines are wrong."""
@@ -47,6 +51,18 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         kept = items[first::TENTHS]
         config.hook.pytest_deselected(items=[item for item in items if item not in kept])
         items[:] = kept
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, object, object]:
+    """Whole programs run without checks of shapes, their fixtures, too."""
+    folder = item.path.relative_to(Path(__file__).parent.parent).parts
+    if folder[0] == "tests" and folder[1] in END_TO_END:
+        from typecheck import unchecked  # noqa: PLC0415  # found beside this file
+
+        with unchecked():
+            return (yield)
+    return (yield)
 
 
 def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:

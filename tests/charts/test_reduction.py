@@ -172,6 +172,7 @@ def test_the_reduced_arch_agrees_with_single_paths(arch_set):
     assert chart.lost <= 2
 
 
+@pytest.mark.slow
 def test_quasi_static_paths_of_the_arch_change_where_they_merge_with_folds_or_meet_the_bound():
     """Each change has a cause: the unloaded arch has max |κ| = 20, or Newton's cusp is confirmed.
 

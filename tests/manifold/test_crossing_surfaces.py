@@ -63,6 +63,7 @@ def assert_on_crossing(eset: EquilibriumSet, slant: float, other: float) -> None
     assert (eset.audit.components, eset.audit.euler_characteristic) == (1, 1)
 
 
+@pytest.mark.slow
 @few(2)
 @given(st.sampled_from([-2.0, -0.7, 0.6, 1.0]), slants, slants, intervals)
 def test_pitchfork_surface_joins_both_halves_of_a_cylinder(cubic, slant, other, grid):

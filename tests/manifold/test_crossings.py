@@ -119,6 +119,7 @@ def test_transcritical_planes_cross_along_a_line(skew, slant, grid):
     assert (eset.audit.components, eset.audit.euler_characteristic) == (1, 1)
 
 
+@pytest.mark.slow
 @few(4)
 @given(cubics, intervals)
 def test_folds_leave_the_pitchforks_where_these_turn_subcritical(cubic, grid):
@@ -135,6 +136,7 @@ def test_folds_leave_the_pitchforks_where_these_turn_subcritical(cubic, grid):
     assert sorted(piece.index for piece in eset.strata) == [0, 0, 0, 1, 1, 1]
 
 
+@pytest.mark.slow
 @few(4)
 @given(st.sampled_from([0.4, 1.0, 2.5]), intervals)
 def test_fold_of_the_symmetric_sheet_passes_its_pitchforks(k, grid):
@@ -149,6 +151,7 @@ def test_fold_of_the_symmetric_sheet_passes_its_pitchforks(k, grid):
     np.testing.assert_allclose(eset.coordinates[hub], [[0.0, 0.0]], atol=1e-3)
 
 
+@pytest.mark.slow
 @few(4)
 @given(intervals)
 def test_sheet_can_fold_where_it_crosses_another(grid):

@@ -53,6 +53,7 @@ def test_points_that_close_cells_along_a_constraint_are_of_their_sheet(load, int
     assert_faithful(eset)
 
 
+@pytest.mark.slow
 def test_a_tongue_that_leaves_its_cell_between_vertices_is_lifted_to_its_tip():
     """Tongues of indices 7 to 14 around Δ = 0, which end one after the other from Θ = 0.8357 on.
 

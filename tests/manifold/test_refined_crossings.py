@@ -213,7 +213,8 @@ def test_folds_that_pass_a_crossing_keep_their_common_point(structure, box):
     np.testing.assert_allclose(eset.coordinates[hub], [[0.0, 0.0]], atol=1e-3)
 
 
-@pytest.mark.parametrize("accuracy", [None, pytest.param(0.02, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("accuracy", [None, 0.02])
 def test_cusps_lie_where_pitchforks_change_their_criticality(accuracy):
     """x (x⁴ − 0.7·b x² − a): at the origin the fold's image a = −(0.35·b)² turns back.
 

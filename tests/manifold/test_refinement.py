@@ -117,6 +117,7 @@ def test_folds_and_sides_of_the_box_carry_the_new_vertices_on_them():
     assert off.max() < 0.001 * 2.0  # it is measured at the chord's x, not across the curve
 
 
+@pytest.mark.slow
 @few(4)
 @given(st.booleans(), st.tuples(st.integers(4, 9), st.integers(4, 9)))
 def test_no_cell_is_folded_over_beside_cusps(several, grid):

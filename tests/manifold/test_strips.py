@@ -40,8 +40,11 @@ def test_a_strip_between_pitchforks_hangs_together(strip):
 
 @pytest.mark.parametrize(
     ("squared_width", "sign", "euler"),
-    [("0.01", -1, -1), ("0.01*(0.5 - b)*(b + 0.5)", 1, 3), ("0.0009", 1, -1)],
-    ids=["subcritical", "closed", "seen by no vertex"],
+    [
+        pytest.param("0.01", -1, -1, id="subcritical", marks=pytest.mark.slow),
+        pytest.param("0.01*(0.5 - b)*(b + 0.5)", 1, 3, id="closed", marks=pytest.mark.slow),
+        pytest.param("0.0009", 1, -1, id="seen by no vertex"),
+    ],
 )
 def test_strips_on_another_grid(squared_width, sign, euler):
     """A closed strip is a sphere: plane 1, sphere 2, less their common circle 0."""

@@ -114,6 +114,7 @@ def test_a_sheet_ends_where_constraints_become_dependent():
     np.testing.assert_allclose(independence(eset.points)[ends], 0.02, rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_chains_with_a_reversed_link_end_where_they_lie_in_one_line():
     """Four links one way and one the other: at span 3/5, whatever the load; 2280 rays were lost."""
     chain = specimens.closed_chain()

@@ -126,8 +126,12 @@ def test_kills_at_random_times_change_nothing(
     """100 kills: 70 in runs that mostly compute, 30 in runs that mostly draw."""
     stages = _kill(dotted, 70 // PARTS, tmp_path / "dotted", seed=2 * seed)
     stages += _kill(spring, 30 // PARTS, tmp_path / "spring", seed=2 * seed + 1)
+    for more in range(10):  # on a busy machine a run may be slower than the one that was timed
+        if "figures" in stages:
+            break
+        stages += _kill(spring, 1, tmp_path / f"more-{more}", seed=100 + 10 * seed + more)
     record_property("stages", dict(stages))
-    assert stages.total() == 100 // PARTS
+    assert stages.total() >= 100 // PARTS
     assert "figures" in stages
     assert {"equilibrium set", "route"} & set(stages)
 

@@ -109,9 +109,8 @@ def test_cheap_snaps_are_taken_and_dear_ones_are_not(arch_set, ends):
     assert dear.cost == pytest.approx(free.cost, rel=1e-6)
 
 
-@pytest.mark.parametrize(
-    "price", [0.92, *(pytest.param(each, marks=pytest.mark.slow) for each in (0.88, 0.95, 1.2))]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("price", [0.88, 0.92, 0.95, 1.2])
 def test_a_price_on_snaps_makes_no_route_dearer(spring_set, price):
     """Routes that may snap are routes without a snap, too: 1.46 was the answer beside 1.37."""
     start, goal = (spring_set.at(x_l=0.8, F=0.0).stable[k] for k in (0, 1))

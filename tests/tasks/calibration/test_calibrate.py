@@ -85,6 +85,7 @@ def test_the_jacobian_is_that_of_the_equilibria(nominal):
     np.testing.assert_allclose(found, exact, rtol=1e-9, atol=1e-11)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("quick")
 def test_the_covariance_is_that_of_repeated_fits(nominal, angles):
     """Normalised errors of k unknowns have the mean square k: variance 2 k over the trials.

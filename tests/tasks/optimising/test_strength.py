@@ -86,6 +86,7 @@ def test_the_best_setting_under_half_a_load_is_at_the_edge_of_a_cliff(left_half)
         assert left_half.rays(near).max() < best.value
 
 
+@pytest.mark.slow
 def test_a_robust_setting_keeps_away_from_the_cliff(left_half):
     """Errors of ±0.02: the worst case of the best setting is far below its value."""
     offsets = {"Theta": 0.02, "Delta": 0.02}
