@@ -35,6 +35,21 @@ class ProofStatus(StrEnum):
     """The bounds fail somewhere, or there are none."""
 
 
+def standing(why: str, enclosed: bool) -> ProofStatus:
+    """Status of a proof that failed for a reason, or else has bounds that are enclosed or not."""
+    if why:
+        return ProofStatus.UNPROVED
+    return ProofStatus.PROVED if enclosed else ProofStatus.SUPPORTED
+
+
+def no_bounds(structure: Structure) -> str:
+    """Reason why nothing is proved of a structure whose derivatives have no bounds."""
+    return (
+        f"a {structure.kind} with {structure.size} unknowns knows no bounds of its "
+        "derivatives and has too many to sample"
+    )
+
+
 Evidence = Literal["enclosed", "structural", "sampled"]
 
 
@@ -74,9 +89,7 @@ class Proof:
     @property
     def status(self) -> ProofStatus:
         """Proved only if the bounds are enclosed; see `ProofStatus`."""
-        if self.why:
-            return ProofStatus.UNPROVED
-        return ProofStatus.PROVED if self.bounds == "enclosed" else ProofStatus.SUPPORTED
+        return standing(self.why, self.bounds == "enclosed")
 
     def __repr__(self) -> str:
         """Status, number of segments and the margin, or why there is no proof."""
@@ -100,11 +113,7 @@ def prove(states: States, margin: float = 0.0) -> Proof:
     structure = states.structure
     kind = kind_of_bounds(states)
     if kind == "unknown":
-        why = (
-            f"a {structure.kind} with {structure.size} unknowns knows no bounds of its "
-            "derivatives and has too many to sample"
-        )
-        return Proof(why, states, np.zeros(0), 0.0, "sampled")
+        return Proof(no_bounds(structure), states, np.zeros(0), 0.0, "sampled")
     states = _without_repeats(states)
     bounds = _all_bounds(states[:-1], states[1:], margin)
     for _ in range(MOST_BISECTIONS):

@@ -3,6 +3,7 @@
 A cell is a segment of the route, shifted by the middle of a part of the box. Its proof shows one
 stable equilibrium for each point of it; where two cells share a face, those of both are the same as
 soon as they agree in one point of it. So all cells together carry one continuous family of states.
+A box of parameters around a single state is a tube around a route without length.
 
 See docs/decisions.md, "Tubes are proved cell by cell".
 """
@@ -15,11 +16,11 @@ import numpy as np
 from equimorph.array_types import Float, Int
 from equimorph.arrays import Flags, Lanes, Pairs, Parameters
 from equimorph.columns import Columns
-from equimorph.equilibria import ParameterLine, TraceOptions, settle, trace
+from equimorph.equilibria import Event, ParameterLine, TraceOptions, settle, trace
 from equimorph.equilibria.soft_modes import metric_length
 from equimorph.equilibria.trace_options import EventCode
 from equimorph.model import Constraint, worst_relative_excess
-from equimorph.structures import State, States, Structure
+from equimorph.structures import State, States
 from equimorph.tasks.verification.error_box import Deviation, ErrorBox
 from equimorph.tasks.verification.newton_kantorovich import Bounds, segment_bounds
 from equimorph.tasks.verification.proof import (
@@ -27,6 +28,8 @@ from equimorph.tasks.verification.proof import (
     ProofStatus,
     bounds_in_parts,
     kind_of_bounds,
+    no_bounds,
+    standing,
 )
 
 MOST_CELLS = 20_000
@@ -35,6 +38,8 @@ MOST_ENTRIES = 20_000_000
 """Entries of their matrices that are."""
 MOST_ROUNDS = 14
 """Bisections of a segment and of the box around it before that."""
+LEAST_SHARE = 1e-12
+"""What half widths, squared, count beside the moves of states where a cell is cut."""
 HOPELESS = 4.0
 """Ratio of what errors of data and all others move states in a cell that need not be divided."""
 ROUNDING = 1e-13
@@ -44,7 +49,7 @@ Corners = Float[np.ndarray, "cells axes"]
 
 
 @dataclass(frozen=True)
-class _Cells(Columns):
+class Cells(Columns):
     """Cells of a tube.
 
     Parameters
@@ -63,21 +68,61 @@ class _Cells(Columns):
     lower: Corners
     upper: Corners
 
+    @property
+    def middle(self) -> Corners:
+        """Places of the middles; exact, as cells are halves of halves."""
+        return np.asarray(0.5 * (self.lower + self.upper))
+
+    def place(self, end: int) -> Corners:
+        """Places of the ends of the segments at the middle of the box; exact."""
+        place = self.middle
+        place[:, 0] = (self.lower, self.upper)[end][:, 0]
+        return place
+
 
 @dataclass(frozen=True)
-class _Judged(Columns):
-    """Cells, what is proved of them, and their linear responses to the errors at both ends."""
+class Judged(Columns):
+    """Cells, what is proved of them, and their linear responses to the errors at both ends.
 
-    cells: _Cells
+    `good` tells which cells hold stable and admissible states alone, with the margin asked for.
+    """
+
+    cells: Cells
     bounds: Bounds
     responses: Float[np.ndarray, "cells ends m size"]
-    admissible: Flags
+    good: Flags
 
-    @property
-    def good(self) -> Flags:
-        """Cells with stable and admissible states alone."""
-        bounds = self.bounds
-        return np.asarray(bounds.proved & bounds.stable & self.admissible)
+    def at(self, place: Corners) -> Lanes:
+        """States expected at places of the cells, to first order in the errors."""
+        cells = self.cells
+        share = ((place - cells.lower) / (cells.upper - cells.lower))[:, :1]
+        half = 0.5 * (cells.upper - cells.lower)[:, 1:]
+        errors = ((place - cells.middle)[:, 1:] / half)[:, :, None]
+        first, last = np.moveaxis(self.responses[:, :, : errors.shape[1]], 1, 0)
+        z = (1.0 - share) * (cells.before + (first * errors).sum(axis=1))
+        return np.asarray(z + share * (cells.after + (last * errors).sum(axis=1)))
+
+
+@dataclass(frozen=True)
+class Division:
+    """Cells into which a tube was divided.
+
+    Parameters
+    ----------
+    why
+        Reason if not all are proved or supported, else empty.
+    judged
+        The cells.
+    tried
+        Number of all cells that were tried.
+    failed
+        State in the first cell for which the bound fails, or at which a sheet of states ends.
+    """
+
+    why: str
+    judged: Judged
+    tried: int
+    failed: State | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,11 +151,9 @@ class TubeProof:
 
     @property
     def status(self) -> ProofStatus:
-        """Proved only if all bounds are structural; see `ProofStatus`."""
-        if self.why:
-            return ProofStatus.UNPROVED
-        proved = self.bounds == "enclosed" and not self.sampled_constraints
-        return ProofStatus.PROVED if proved else ProofStatus.SUPPORTED
+        """Proved only if all bounds are enclosed, and there are no constraints."""
+        enclosed = self.bounds == "enclosed" and not self.sampled_constraints
+        return standing(self.why, enclosed)
 
     def __repr__(self) -> str:
         """Status and number of cells, or why there is no proof."""
@@ -135,6 +178,10 @@ class Tube:
         Constraints that all states obey.
     within_changed
         The same of the structure of each of the deviations.
+    margin
+        Stability margin to be proved; None: any.
+    most
+        Cells that are tried at most; None: as many as memory and `MOST_ROUNDS` bisections allow.
     """
 
     states: States
@@ -142,79 +189,87 @@ class Tube:
     deviations: tuple[Deviation, ...] = ()
     within: tuple[Constraint, ...] = ()
     within_changed: tuple[tuple[Constraint, ...], ...] = ()
+    margin: float | None = None
+    most: int | None = None
 
     def prove(self) -> TubeProof:
-        """Prove, or support, that all states of the tube are stable and admissible.
-
-        A cell whose bound fails is bisected along the axis that moves its states most: the route,
-        or an error of a parameter. Errors of data are not divided.
-        """
+        """Prove, or support, that all states of the tube are stable and admissible."""
         kind = kind_of_bounds(self.states)
         sampled = bool(self.within)
         if kind == "unknown":
-            why = (
-                f"a {self._structure.kind} with {self._structure.size} unknowns knows no bound of "
-                "its second derivatives and has too many to sample"
-            )
-            return TubeProof(why, 0, kind, sampled)
-        most = min(MOST_CELLS, MOST_ENTRIES // self._structure.size**2)
-        whole = self._judge(self._first_cells())
-        tried = len(whole.cells.lower)
-        for _ in range(MOST_ROUNDS):
+            return TubeProof(no_bounds(self.states.structure), 0, kind, sampled)
+        done = self.divide()
+        cells = done.tried if done.why else len(done.judged.good)
+        return TubeProof(done.why, cells, kind, sampled, done.failed)
+
+    def divide(self) -> Division:
+        """Bisect cells until all are proved and joined, or one of them is lost, or too many.
+
+        A cell whose bound fails is cut across the axis that moves its states most: the route, or
+        an error of a parameter. Errors of data are not divided.
+        """
+        structure, errors = self.states.structure, len(self.steps)
+        most = self.most or min(MOST_CELLS, MOST_ENTRIES // structure.size**2)
+        rounds = MOST_ROUNDS if self.most is None else most
+        whole, why = self._judge(self._first_cells()), f"{rounds} bisections do not suffice"
+        tried = len(whole.good)
+        for _ in range(rounds):
             bad = np.flatnonzero(~whole.good)
             if len(bad) == 0:
                 bad = _apart(whole)
             if len(bad) == 0:
-                return TubeProof("", len(whole.good), kind, sampled)
+                return Division("", whole, tried)
             if tried + 2 * len(bad) > most:
+                why = f"{most} cells do not suffice"
                 break
-            divided = self._divide(whole.take(bad))
-            if divided is None:
+            moves = self._moves(whole.take(bad))
+            data = moves[:, 1 + errors :].max(axis=1, initial=0.0)
+            if (data > HOPELESS**2 * moves[:, : 1 + errors].max(axis=1)).any():
+                why = "errors of data, which are not divided, move the states too far"
                 break
-            halves, found = divided
-            if not found.all():
-                lost = self._middle(whole.cells.take(bad[~found][:1]))
-                why = "with some errors there is no stable state beside one of the route"
-                return TubeProof(why, tried, kind, sampled, lost)
+            halves, lost = self._halves(whole.take(bad), moves[:, : 1 + errors].argmax(axis=1))
+            if lost is not None:
+                return Division(f"the sheet ends at a {lost.kind}", whole, tried, lost.state)
             tried += 2 * len(bad)
             rest = whole.take(np.setdiff1d(np.arange(len(whole.good)), bad))
-            whole = _Judged.concatenate([rest, self._judge(halves)])
-        failed = self._middle(whole.cells.take(bad[:1]))
-        why = f"the bound fails around some states after {tried} cells were tried"
-        return TubeProof(why, tried, kind, sampled, failed)
+            whole = Judged.concatenate([rest, self._judge(halves)])
+        cell = whole.cells.take(bad[:1])
+        z, p = 0.5 * (cell.before + cell.after), 0.5 * (cell.start + cell.end)
+        failed = State(structure, settle(structure, z, p).z[0], p[0])
+        return Division(why, whole, tried, failed)
 
-    @property
-    def _structure(self) -> Structure:
-        return self.states.structure
-
-    def _first_cells(self) -> _Cells:
+    def _first_cells(self) -> Cells:
         z, p = self.states.z, self.states.p
         count, m = len(z) - 1, len(self.steps)
         at = np.arange(count, dtype=float)[:, None]
         lower = np.concatenate([at, -np.ones((count, m))], axis=1)
         upper = np.concatenate([at + 1.0, np.ones((count, m))], axis=1)
-        return _Cells(z[:-1], z[1:], p[:-1], p[1:], lower, upper)
+        return Cells(z[:-1], z[1:], p[:-1], p[1:], lower, upper)
 
-    def _ends(self, cells: _Cells) -> tuple[States, States]:
-        made = self._structure
-        return States(made, cells.before, cells.start), States(made, cells.after, cells.end)
+    def _parameters(self, place: Corners) -> Parameters:
+        """Parameters at places; the same ones at the same place of different cells."""
+        route = np.arange(len(self.states))
+        along = [np.interp(place[:, 0], route, column) for column in self.states.p.T]
+        return np.asarray(np.stack(along, axis=1) + place[:, 1:] @ self.steps)
 
-    def _errors(self, cells: _Cells) -> ErrorBox:
+    def _errors(self, cells: Cells) -> ErrorBox:
         half = 0.5 * (cells.upper - cells.lower)[:, 1:]
         return ErrorBox(half[:, :, None] * self.steps, self.deviations)
 
-    def _judge(self, cells: _Cells) -> _Judged:
-        ends, errors = self._ends(cells), self._errors(cells)
+    def _judge(self, cells: Cells) -> Judged:
+        errors, made = self._errors(cells), self.states.structure
+        ends = States(made, cells.before, cells.start), States(made, cells.after, cells.end)
 
         def part(rows: slice) -> Bounds:
-            return segment_bounds(ends[0][rows], ends[1][rows], None, errors.take(rows))
+            return segment_bounds(ends[0][rows], ends[1][rows], self.margin, errors.take(rows))
 
         bounds = bounds_in_parts(ends[0], part)
         responses = np.stack([errors.responses(end) for end in ends], axis=1)
-        return _Judged(cells, bounds, responses, self._admissible(cells, responses))
+        good = bounds.proved & bounds.stable & (bounds.margin >= (self.margin or 0.0))
+        return Judged(cells, bounds, responses, good & self._admissible(cells, responses))
 
     def _admissible(
-        self, cells: _Cells, responses: Float[np.ndarray, "cells ends m size"]
+        self, cells: Cells, responses: Float[np.ndarray, "cells ends m size"]
     ) -> Flags:
         """Whether constraints hold with the sum of their changes along all axes of each cell."""
         count = len(cells.lower)
@@ -241,100 +296,76 @@ class Tube:
             good &= here + change <= 0.0
         return good
 
-    def _divide(self, judged: _Judged) -> tuple[_Cells, Flags] | None:
-        """Both halves of cells, and whether their states are stable and near what is expected.
+    def _moves(self, judged: Judged) -> Float[np.ndarray, "cells axes"]:
+        """How far, squared, states move along the route, by errors of parameters, and of data."""
+        cells, structure = judged.cells, self.states.structure
+        along = 0.5 * (cells.after - cells.before), 0.5 * (cells.end - cells.start)
+        turns = np.concatenate([along[0][:, None], judged.responses.mean(axis=1)], axis=1)
+        steps = np.concatenate([along[1][:, None], self._errors(cells).steps], axis=1)
+        moves = np.asarray(turns[:, :, : structure.unknowns] ** 2 @ structure.mass)
+        widths = ((steps / structure.scales) ** 2).sum(axis=2)
+        moves[:, : widths.shape[1]] += LEAST_SHARE * widths
+        return moves
 
-        None if errors of data, which are not divided, move the states of one so much more that
-        halves do not help.
-        """
-        cells, axes = judged.cells, len(self.steps)
-        structure, n = self._structure, self._structure.unknowns
-        along = metric_length(structure, 0.5 * (cells.after - cells.before)[:, :n])
-        aside = np.sqrt(judged.responses.mean(axis=1)[:, :, :n] ** 2 @ structure.mass)
-        moves = np.concatenate([along[:, None], aside[:, :axes]], axis=1)
-        axis = moves.argmax(axis=1)
-        if (aside[:, axes:].max(axis=1, initial=0.0) > HOPELESS * moves.max(axis=1)).any():
-            return None
-        rows, middle = np.arange(len(axis)), 0.5 * (cells.lower + cells.upper)
-        found, halves = np.ones(len(axis), bool), []
-        for sign in (-1.0, 1.0):
-            lower, upper = cells.lower.copy(), cells.upper.copy()
-            (lower if sign > 0.0 else upper)[rows, axis] = middle[rows, axis]
-            half = replace(cells, lower=lower, upper=upper)
-            half, good = self._with_states(half, judged, axis, sign)
-            found &= good
-            halves.append(half)
-        return _Cells.concatenate(halves), found
-
-    def _with_states(
-        self, half: _Cells, judged: _Judged, axis: Int[np.ndarray, " cells"], sign: float
-    ) -> tuple[_Cells, Flags]:
-        """Halves with the states at their ends, and whether these are as expected."""
-        whole, steps = judged.cells, self._errors(judged.cells).steps
-        rows = np.arange(len(axis))
-        aside, error = axis > 0, np.maximum(axis - 1, 0)
-        z, p = [whole.before, whole.after], [whole.start, whole.end]
-        split = (0.5 * (z[0] + z[1]), 0.5 * (p[0] + p[1]))
-        found = np.ones(len(axis), bool)
-        out: list[tuple[Lanes, Parameters]] = []
-        for end in (0, 1):
-            new_z, new_p = z[end].copy(), p[end].copy()
-            inner = ~aside & (end == (sign < 0.0))
-            new_z[inner], new_p[inner] = split[0][inner], split[1][inner]
-            if len(self.steps):
-                dz = 0.5 * sign * judged.responses[rows, end, error]
-                dp = 0.5 * sign * steps[rows, error]
-                new_z[aside] += dz[aside]
-                new_p[aside] += dp[aside]
-            moved = np.flatnonzero(aside | inner)
-            origin = States(self._structure, z[end][moved], p[end][moved])
-            exact, good = self._states(origin, new_z[moved], new_p[moved])
-            new_z[moved] = exact
-            found[moved] &= good
-            out.append((new_z, new_p))
-        (before, start), (after, last) = out
-        return replace(half, before=before, after=after, start=start, end=last), found
-
-    def _states(self, origin: States, guess: Lanes, p: Parameters) -> tuple[Lanes, Flags]:
-        """States near guesses, lifted where these are bad, and whether they are stable."""
-        structure, n = self._structure, self._structure.unknowns
-        near = settle(structure, guess, p)
-        away = metric_length(structure, (near.z - guess)[:, :n])
-        way = metric_length(structure, (guess - origin.z)[:, :n])
-        z, good = near.z, near.found & (away <= LARGEST_SAGITTA * way + 1e-12)
-        far = np.flatnonzero(~good)
-        if len(far):
-            line = ParameterLine(structure, origin.p[far], p[far] - origin.p[far])
-            lifted = trace(line, origin.z[far], (), TraceOptions(record=False))
-            exact = settle(structure, lifted.z, p[far])
-            z[far], good[far] = exact.z, (lifted.code == EventCode.ARRIVED) & exact.found
-        good[good] = structure.index(z[good], p[good]) == 0
-        return z, good
-
-    def _middle(self, cell: _Cells) -> State:
-        """State in the middle of a cell."""
-        z, p = 0.5 * (cell.before + cell.after), 0.5 * (cell.start + cell.end)
-        return State(self._structure, settle(self._structure, z, p).z[0], p[0])
+    def _halves(
+        self, judged: Judged, axis: Int[np.ndarray, " cells"]
+    ) -> tuple[Cells, Event | None]:
+        """Both halves of cells with the states at their ends; or what a lift to one of them met."""
+        cells, rows = judged.cells, np.arange(len(axis))
+        lower, upper = cells.lower.copy(), cells.upper.copy()
+        lower[rows, axis] = upper[rows, axis] = cells.middle[rows, axis]
+        halves = Cells.concatenate([replace(cells, upper=upper), replace(cells, lower=lower)])
+        twice, structure = Judged.concatenate([judged, judged]), self.states.structure
+        ends = []
+        for end, (old, p) in enumerate(((halves.before, halves.start), (halves.after, halves.end))):
+            place = halves.place(end)
+            goal, z = self._parameters(place), old.copy()
+            moved = np.flatnonzero((goal != p).any(axis=1))
+            origin = States(structure, old[moved], p[moved])
+            z[moved], lost = _move(origin, twice.at(place)[moved], goal[moved])
+            if lost is not None:
+                return halves, lost
+            ends.append((z, goal))
+        (before, start), (after, last) = ends
+        return replace(halves, before=before, after=after, start=start, end=last), None
 
 
-def _apart(judged: _Judged) -> Int[np.ndarray, " cells"]:
-    """Numbers of cells whose states are not shown to be those of a neighbour."""
-    lower, upper = judged.cells.lower, judged.cells.upper
-    pairs = neighbours(lower, upper)
-    one, other = pairs.T
-    low = np.maximum(lower[one], lower[other])
-    high = np.minimum(upper[one], upper[other])
-    gap = np.abs(_at(judged, one, 0.5 * (low + high)) - _at(judged, other, 0.5 * (low + high)))
-    return parted(pairs, gap + ROUNDING * (1.0 + np.abs(judged.cells.before[one])), judged.bounds)
+def _move(origin: States, guess: Lanes, p: Parameters) -> tuple[Lanes, Event | None]:
+    """Stable states near guesses, lifted where these are bad; or what such a lift met."""
+    structure, n = origin.structure, origin.structure.unknowns
+    near = settle(structure, guess, p)
+    away = metric_length(structure, (near.z - guess)[:, :n])
+    way = metric_length(structure, (guess - origin.z)[:, :n])
+    z, good = near.z, near.found & (away <= LARGEST_SAGITTA * way + 1e-12)
+    good[good] = structure.index(z[good], p[good]) == 0
+    far = np.flatnonzero(~good)
+    if len(far) == 0:
+        return z, None
+    line = ParameterLine(structure, origin.p[far], p[far] - origin.p[far])
+    lifted = trace(line, origin.z[far], (), TraceOptions(record=False))
+    lost = np.flatnonzero(lifted.code != EventCode.ARRIVED)
+    if len(lost):
+        k, t = int(lost[0]), lifted.t[lost[0]]
+        state = State(structure, lifted.z[k], line.start[k] + t * line.velocity[k])
+        return z, Event(EventCode(int(lifted.code[k])).kind, state, float(t))
+    z[far] = lifted.z
+    return z, None
 
 
-def parted(pairs: Pairs, gap: Lanes, bounds: Bounds) -> Int[np.ndarray, " cells"]:
-    """Numbers of cells, among pairs whose expectations differ by a gap, that may have two states.
+def _apart(judged: Judged) -> Int[np.ndarray, " cells"]:
+    """Numbers of cells whose states are not shown to be those of a neighbour.
 
-    They have one if the state of either lies where the other has only one.
+    They are if the state of either, at one point of the common face, lies where the other has only
+    one.
     """
-    near, alone = (each[:, None] * bounds.weights for each in (bounds.error, bounds.unique))
+    cells, bounds = judged.cells, judged.bounds
+    pairs = neighbours(cells.lower, cells.upper)
     one, other = pairs.T
+    low = np.maximum(cells.lower[one], cells.lower[other])
+    face = 0.5 * (low + np.minimum(cells.upper[one], cells.upper[other]))
+    gap = np.abs(judged.take(one).at(face) - judged.take(other).at(face))
+    gap += ROUNDING * (1.0 + np.abs(cells.before[one]))
+    near, alone = (each[:, None] * bounds.weights for each in (bounds.error, bounds.unique))
     there = (gap + near[one] < alone[other]).all(axis=1)
     back = (gap + near[other] < alone[one]).all(axis=1)
     return np.unique(pairs[~(there | back)])
@@ -342,24 +373,14 @@ def parted(pairs: Pairs, gap: Lanes, bounds: Bounds) -> Int[np.ndarray, " cells"
 
 def neighbours(lower: Corners, upper: Corners) -> Pairs:
     """Pairs of cells that share a face."""
-    order = np.argsort(lower[:, 0], kind="stable")
-    begins = lower[order, 0]
+    axis = int(np.argmax([len(np.unique(column)) for column in lower.T]))
+    order = np.argsort(lower[:, axis], kind="stable")
+    begins = lower[order, axis]
     # of the cells behind each in this order those that begin before it ends
-    counts = np.searchsorted(begins, upper[order, 0], side="right") - np.arange(len(order)) - 1
+    counts = np.searchsorted(begins, upper[order, axis], side="right") - np.arange(len(order)) - 1
     one = np.repeat(np.arange(len(order)), counts)
     other = one + 1 + np.arange(len(one)) - np.repeat(np.cumsum(counts) - counts, counts)
     one, other = order[one], order[other]
     overlap = np.minimum(upper[one], upper[other]) - np.maximum(lower[one], lower[other])
     faces = (overlap >= 0.0).all(axis=1) & ((overlap == 0.0).sum(axis=1) == 1)
     return np.stack([one[faces], other[faces]], axis=1)
-
-
-def _at(judged: _Judged, rows: Int[np.ndarray, " pairs"], place: Corners) -> Lanes:
-    """What cells expect at places on their faces, to first order in the errors."""
-    cells = judged.cells.take(rows)
-    share = ((place - cells.lower) / (cells.upper - cells.lower))[:, :1]
-    half = 0.5 * (cells.upper - cells.lower)[:, 1:]
-    errors = ((place - 0.5 * (cells.lower + cells.upper))[:, 1:] / half)[:, :, None]
-    first, last = np.moveaxis(judged.responses[rows, :, : errors.shape[1]], 1, 0)
-    z = (1.0 - share) * (cells.before + (first * errors).sum(axis=1))
-    return np.asarray(z + share * (cells.after + (last * errors).sum(axis=1)))
