@@ -268,9 +268,7 @@ class Tube:
         good = bounds.proved & bounds.stable & (bounds.margin >= (self.margin or 0.0))
         return Judged(cells, bounds, responses, good & self._admissible(cells, responses))
 
-    def _admissible(
-        self, cells: Cells, responses: Float[np.ndarray, "cells ends m size"]
-    ) -> Flags:
+    def _admissible(self, cells: Cells, responses: Float[np.ndarray, "cells ends m size"]) -> Flags:
         """Whether constraints hold with the sum of their changes along all axes of each cell."""
         count = len(cells.lower)
         if not self.within:
