@@ -55,15 +55,15 @@ def bench_states_of_a_descriptor_chart(benchmark, stable):
 
 
 def bench_states_of_a_reduction(benchmark, large):
-    chart = em.reduce(large, prefer=em.lowest(large.structure.descriptor("energy")))
+    chart = em.reduce(large, prefer=em.charts.lowest(large.structure.descriptor("energy")))
     at = np.random.default_rng(0).uniform(BOX.lower, BOX.upper, (10_000, 2))
     benchmark.pedantic(chart.state, (at,), rounds=3, warmup_rounds=1)
 
 
 RULES = {
-    "lowest": lambda arch: em.lowest(arch.descriptor("energy")),
-    "highest": lambda arch: em.highest(arch.descriptor("energy")),
-    "nearest": lambda _: em.nearest(0),
+    "lowest": lambda arch: em.charts.lowest(arch.descriptor("energy")),
+    "highest": lambda arch: em.charts.highest(arch.descriptor("energy")),
+    "nearest": lambda _: em.charts.nearest(0),
     "quasi_static": lambda _: em.quasi_static("q"),
     "first_stable": lambda _: em.first_stable_on_path("q"),
 }

@@ -55,8 +55,8 @@ def truss() -> tuple[list[em.EquilibriumSet], list[em.Descriptor]]:
 def _motors(rod: em.Rod) -> list[em.Descriptor]:
     """Couples of both motors, and the larger of them."""
     both = [em.effort_of(rod, name) for name in ("Theta", "Delta")]
-    first = em.combined("M_A", lambda a, b: 0.5 * (a + b), *both)
-    second = em.combined("M_B", lambda a, b: 0.5 * (a - b), *both)
+    first = em.function_of("M_A", lambda a, b: 0.5 * (a + b), *both)
+    second = em.function_of("M_B", lambda a, b: 0.5 * (a - b), *both)
     return [first, abs(second), em.largest_of("motor", abs(first), abs(second))]
 
 

@@ -32,8 +32,8 @@ def arch(k: list[float], b: list[float]) -> em.Rod:
 def torque(rod: em.Rod) -> em.Descriptor:
     """Larger couple of the two motors."""
     efforts = [em.effort_of(rod, name) for name in ("Theta", "Delta")]
-    first = em.combined("M_A", lambda a, b: 0.5 * (a + b), *efforts)
-    second = em.combined("M_B", lambda a, b: 0.5 * (a - b), *efforts)
+    first = em.function_of("M_A", lambda a, b: 0.5 * (a + b), *efforts)
+    second = em.function_of("M_B", lambda a, b: 0.5 * (a - b), *efforts)
     return em.largest_of("torque", abs(first), abs(second))
 
 

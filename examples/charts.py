@@ -28,7 +28,7 @@ def main() -> Panels:
     panels: Panels = [
         em.Projection(right),
         em.DescriptorChart(whole, [angle, "x_l"]),
-        em.reduce(capped, prefer=em.lowest(energy)),
+        em.reduce(capped, prefer=em.charts.lowest(energy)),
         em.dissect(whole),
     ]
     for panel in panels:

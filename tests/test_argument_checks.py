@@ -92,7 +92,7 @@ class Things:
             em.LimitLoadMap: self.map, em.Route: self.route, em.Path: self.path,
             em.TraceOptions: em.TraceOptions(), em.SamplingOptions: em.SamplingOptions(),
             em.LoadLimit: em.LoadLimit(self.state, "F"),
-            em.Disc: em.Disc((0.0, 0.0), 1.0), em.charts.Rule: em.lowest(angle),
+            em.Disc: em.Disc((0.0, 0.0), 1.0), em.charts.Rule: em.charts.lowest(angle),
             int: 2, float: 0.5, bool: False, str: "angle",
         }  # fmt: skip
         if kind in made:

@@ -84,7 +84,7 @@ def test_a_route_shows_its_length_or_why_there_is_none(eset):
 
 
 def test_a_reduction_shows_its_barriers(eset):
-    reduction = em.reduce(eset, prefer=em.lowest(eset.structure.descriptor("angle")))
+    reduction = em.reduce(eset, prefer=em.charts.lowest(eset.structure.descriptor("angle")))
     rows = dict(_rows(reduction._repr_html_()))
     assert rows["barriers"] == str(len(reduction.barriers))
     assert rows["over"] == "x_l, F"

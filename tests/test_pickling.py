@@ -90,7 +90,7 @@ def test_members_of_one_pickle_share_their_structure():
 def test_functions_at_the_top_of_a_module_come_back():
     rod = em.Rod(load=over_half)
     assert back(rod).natural_state(Theta=0.5).energy == rod.natural_state(Theta=0.5).energy
-    gap = em.combined("gap", np.subtract, rod.height(0.2), rod.height(0.7))
+    gap = em.function_of("gap", np.subtract, rod.height(0.2), rod.height(0.7))
     rest = em.Rod(load=over_half).natural_state(Theta=0.5)
     assert back(gap)(rest) == gap(rest)
     assert back(em.LineLoad(over_half)).shape is over_half
@@ -103,7 +103,7 @@ def test_functions_at_the_top_of_a_module_come_back():
         (lambda: em.Rod(stiffness=lambda s: 1.0 + s), "Rod"),
         (lambda: em.LineLoad(lambda s: 1.0 + s), "LineLoad"),
         (lambda: em.Descriptor("first", "1", lambda z, p: z[:, 0]), "first"),
-        (lambda: em.combined("twice", lambda a: 2 * a, em.Spring().angle) <= 1.0, "twice"),
+        (lambda: em.function_of("twice", lambda a: 2 * a, em.Spring().angle) <= 1.0, "twice"),
         (
             lambda: em.Family(lambda stiffness: em.Spring(2 * stiffness), {"stiffness": 1.0}),
             "Family",

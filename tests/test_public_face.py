@@ -2,8 +2,11 @@
 
 import ast
 from importlib import import_module
+from operator import attrgetter
 from pathlib import Path
 from typing import get_args
+
+import pytest
 
 import equimorph as em
 from equimorph.study.kinds import KINDS
@@ -42,3 +45,12 @@ def test_all_public_names_complete():
     """`dir` is what completion offers."""
     assert set(HOMES) <= set(dir(em))
     assert set(HOMES) <= set(em.__all__)
+
+
+def test_names_of_the_last_version_stay_for_a_release():
+    """Each warns with the new name, which the warning's reader can type as it stands."""
+    for old, new in em.RENAMED.items():
+        with pytest.warns(DeprecationWarning, match=rf"`equimorph\.{new}` now"):
+            found = getattr(em, old)
+        assert found is attrgetter(new)(em)
+        assert old not in dir(em)

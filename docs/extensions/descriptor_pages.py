@@ -15,7 +15,7 @@ GENERAL = (
     "distance_to",
     "outside",
     "worst_over",
-    "held_over",
+    "stable_over",
 )
 TITLE = """\
 # Descriptors

@@ -79,12 +79,12 @@ from .model import (
     Constraint as Constraint,
     Disc as Disc,
     HalfPlane as HalfPlane,
-    combined as combined,
+    function_of as function_of,
     largest_of as largest_of,
 )
 from .equilibria import (
     worst_over as worst_over,
-    held_over as held_over,
+    stable_over as stable_over,
 )
 
 # Find equilibria and follow paths
@@ -176,9 +176,6 @@ from .charts import (
     reduce as reduce,
     Reduction as Reduction,
     Barrier as Barrier,
-    lowest as lowest,
-    highest as highest,
-    nearest as nearest,
     quasi_static as quasi_static,
     first_stable_on_path as first_stable_on_path,
 )

@@ -122,7 +122,7 @@ CLASSES: Mapping[str, tuple[str, str]] = {
     "Progress": ("a sink with the method `report(stage, done, total)`", "sinks"),
     "Journal": ("a journal, like `storage.open_journal(path)`", "journals"),
     "Schedule": ("a schedule, like `route.schedule` of a route that arrived", "schedules"),
-    "Rule": ("a rule, like `lowest(descriptor)`", "rules"),
+    "Rule": ("a rule, like `charts.lowest(descriptor)`", "rules"),
     "LimitLoadMap": ("a map of limit loads, like `limit_load_map(...)`", "maps of limit loads"),
     "LimitLoad": ("a limit load, like `limit_load(...)`", "limit loads"),
     "StateEstimate": ("an answer of `estimate_state`", "answers of `estimate_state`"),

@@ -14,7 +14,9 @@ from typecheck import unchecked
 @pytest.fixture(scope="module")
 def by_energy(spring_set):
     with unchecked():
-        return em.reduce(spring_set, prefer=em.lowest(spring_set.structure.descriptor("energy")))
+        return em.reduce(
+            spring_set, prefer=em.charts.lowest(spring_set.structure.descriptor("energy"))
+        )
 
 
 def test_shapes_beyond_a_barrier_are_none(by_energy):
@@ -73,7 +75,7 @@ def test_the_sheet_nearest_to_a_stratum_is_itself():
             continue
         own = eset.points.z[eset.cells[eset.stratum == number][0], 0]
         with unchecked():
-            chart = em.reduce(eset, prefer=em.nearest(number))
+            chart = em.reduce(eset, prefer=em.charts.nearest(number))
             found = chart.state(at)
         assert chart.barriers == ()
         assert found.inside.all()
@@ -112,7 +114,7 @@ def test_reaching_sampling_and_following_stop_at_the_barrier(by_energy):
         few = em.SamplingOptions(lifts=200)
         room = em.Box(x_l=(0.4, 0.9), F=(-0.2, 0.2))
         sampled = em.plan_sampled(start, goal, room, within=within, options=few)
-        pull = em.combined("pull", lambda f: (f - 0.1) ** 2, force)
+        pull = em.function_of("pull", lambda f: (f - 0.1) ** 2, force)
         moved = em.follow_optimum(start, pull, {"x_l": 0.55}, actuators=["F"], within=within)
     assert reach.states["F"].max() <= 1e-6
     assert sampled.status == "refused"

@@ -21,7 +21,7 @@ def reduced(eset, prefer, **options):
 
 @pytest.fixture(scope="module")
 def by_energy(spring_set):
-    return reduced(spring_set, em.lowest(spring_set.structure.descriptor("energy")))
+    return reduced(spring_set, em.charts.lowest(spring_set.structure.descriptor("energy")))
 
 
 @pytest.fixture(scope="module")
@@ -123,9 +123,9 @@ def test_reduced_charts_are_single_valued(which, request):
 def test_a_function_of_states_and_other_rules_prefer(spring_set):
     angle = spring_set.structure.angle
     chart = reduced(spring_set, lambda states: -angle(states))
-    twin = reduced(spring_set, em.highest(angle))
+    twin = reduced(spring_set, em.charts.highest(angle))
     upper = spring_set.at(x_l=0.5, F=0.0).stable[0]
-    near = reduced(spring_set, em.nearest(upper))
+    near = reduced(spring_set, em.charts.nearest(upper))
     at = np.array([[0.5, 0.1], [0.6, -0.05], [1.2, 0.2]])
     with unchecked():
         values = [each.state(at).states.z[:, 0] for each in (chart, twin)]
@@ -148,7 +148,7 @@ def test_tasks_obey_a_reduction(spring_set, by_energy):
 def test_reduction_over_one_parameter():
     """x² = a: the stable half is preferred from a = 0 on."""
     eset = lifted(fold_form(), em.Box(a=(-1, 1)), (7,))
-    chart = reduced(eset, em.highest(eset.structure.descriptor("0")), stable=False)
+    chart = reduced(eset, em.charts.highest(eset.structure.descriptor("0")), stable=False)
     found = chart.state(np.array([[-0.5], [0.25]]))
     assert found.status.tolist() == ["gap", "inside"]
     assert found.states.z[1, 0] == pytest.approx(0.5, abs=1e-12)
@@ -207,7 +207,7 @@ def test_wrong_reductions_are_refused(spring_set):
     with pytest.raises(InputError, match="`parameter` must be a load"):
         em.reduce(spring_set, prefer=em.quasi_static("x_l"))
     with pytest.raises(InputError, match="`nearest` must name one of 2 strata"):
-        em.reduce(spring_set, prefer=em.nearest(7))
+        em.reduce(spring_set, prefer=em.charts.nearest(7))
 
 
 def test_of_equally_preferred_states_the_highest_is_taken():

@@ -63,6 +63,6 @@ def spring_page(spring_set: em.EquilibriumSet, tmp_path_factory: pytest.TempPath
         folder / "spring.html",
         title="Spring </script><b>&amp;",
         reduction=em.reduce(
-            spring_set, prefer=em.lowest(spring_set.structure.descriptor("energy"))
+            spring_set, prefer=em.charts.lowest(spring_set.structure.descriptor("energy"))
         ),
     )

@@ -5,7 +5,7 @@ import pytest
 
 from equimorph.errors import InputError
 from equimorph.manifold import components, equilibrium_set, refine
-from equimorph.model import Box, combined
+from equimorph.model import Box, function_of
 from equimorph.structures import Spring
 from equimorph.tasks.planning.planner import plan
 from typecheck import unchecked
@@ -22,7 +22,7 @@ def fine_spring(spring_set):
 @pytest.fixture(scope="module")
 def tilted(fine_spring):
     """Stable states at least 0.2 off the axis."""
-    square = combined("square", lambda angle: angle**2, fine_spring.structure.angle)
+    square = function_of("square", lambda angle: angle**2, fine_spring.structure.angle)
     with unchecked():
         return components(fine_spring, stable=True, within=[square >= TILT**2])
 
@@ -91,7 +91,7 @@ def test_pieces_of_the_arch_are_what_routes_can_join(even_arch_set):
     """Upright to inverted: within max |κ| ≤ 11, a band of rises is as wide as the cells."""
     arch = even_arch_set.structure
     rise = arch.height(0.5)
-    apart = combined("bow", lambda height: height**2, rise) >= 0.12**2
+    apart = function_of("bow", lambda height: height**2, rise) >= 0.12**2
     with unchecked():
         here = even_arch_set.at(Theta=1.0, Delta=0.0).stable
         up, down = max(here, key=rise), min(here, key=rise)
@@ -132,7 +132,9 @@ def four_branches():
             Spring(), Box(F=(-0.4, 0.2)), fixed={"x_l": 0.7}, intervals=(40,), checks=0
         )
         bands = [
-            combined(f"from {middle}", lambda angle, at=middle: (angle - at) ** 2, Spring().angle)
+            function_of(
+                f"from {middle}", lambda angle, at=middle: (angle - at) ** 2, Spring().angle
+            )
             for middle in (0.9, -0.8)
         ]
         return components(eset, stable=True, within=[band >= 0.05**2 for band in bands])

@@ -87,9 +87,9 @@ def test_a_module_of_the_user_counts_by_what_is_used_of_it(tmp_path: Path, monke
 def test_combinations_of_descriptors_are_told(structure):
     energy = structure.descriptor("energy")
     margin = em.margin_of(structure)
-    one = em.combined("mine", lambda a, b: a - b, energy, margin)
-    other = em.combined("mine", lambda a, b: a + b, energy, margin)
-    same = em.combined("mine", lambda a, b: a - b, energy, margin)
+    one = em.function_of("mine", lambda a, b: a - b, energy, margin)
+    other = em.function_of("mine", lambda a, b: a + b, energy, margin)
+    same = em.function_of("mine", lambda a, b: a - b, energy, margin)
     assert content_of_descriptor(one) != content_of_descriptor(other)
     assert content_of_descriptor(one) == content_of_descriptor(same)
 

@@ -20,7 +20,9 @@ def spring_set():
 
 def test_barriers_are_thick_and_gaps_hatched(spring_set):
     with unchecked():
-        tie = em.reduce(spring_set, prefer=em.lowest(spring_set.structure.descriptor("energy")))
+        tie = em.reduce(
+            spring_set, prefer=em.charts.lowest(spring_set.structure.descriptor("energy"))
+        )
         loaded = em.reduce(spring_set, prefer=em.quasi_static("F"))
     widths = [line.get_linewidth() for line in chart_domain(tie).lines]
     assert max(widths) == 2.6

@@ -19,10 +19,10 @@ def made(kind, eset):
     makers = {
         "projection": lambda: em.Projection(part(eset, eset.cell_index == 0)),
         "descriptors": lambda: em.DescriptorChart(eset, [spring.angle, "x_l"]),
-        "lowest": lambda: em.reduce(eset, prefer=em.lowest(spring.descriptor("energy"))),
+        "lowest": lambda: em.reduce(eset, prefer=em.charts.lowest(spring.descriptor("energy"))),
         "quasi_static": lambda: em.reduce(eset, prefer=em.quasi_static("F")),
         "first_stable": lambda: em.reduce(eset, prefer=em.first_stable_on_path("F", bound=2.0)),
-        "nearest": lambda: em.reduce(eset, prefer=em.nearest(0)),
+        "nearest": lambda: em.reduce(eset, prefer=em.charts.nearest(0)),
         "atlas": lambda: em.dissect(eset),
     }
     with unchecked():

@@ -105,12 +105,12 @@ def test_the_margin_as_a_constraint_ends_a_lift_where_it_falls_below(bent):
 def test_a_constraint_over_a_range_of_loads_is_the_limit_load_read_backwards():
     """(0.9, 0.02) under a uniform load has its fold at q = 3.9485039281."""
     rest = ARCH.natural_state(Theta=0.9, Delta=0.02)
-    assert em.held_over(ARCH, "q", (0.0, 3.948)).holds(rest.batch)[0]
-    assert not em.held_over(ARCH, "q", (0.0, 3.949)).holds(rest.batch)[0]
+    assert em.stable_over(ARCH, "q", (0.0, 3.948)).holds(rest.batch)[0]
+    assert not em.stable_over(ARCH, "q", (0.0, 3.949)).holds(rest.batch)[0]
     kappa = ARCH.max_curvature
     path = em.lift(rest, {"q": 3.0})
     worst = kappa(path.states).max()
-    held = em.held_over(ARCH, "q", (0.0, 3.0), [kappa <= 10])
+    held = em.stable_over(ARCH, "q", (0.0, 3.0), [kappa <= 10])
     assert held.descriptor(rest) == pytest.approx((worst - 10) / 10, abs=2e-3)
     # the same from any state on the path
     assert held.descriptor(path.end.state) == pytest.approx(held.descriptor(rest), abs=1e-9)
@@ -136,7 +136,7 @@ def test_meaningless_obstacles_are_refused():
     with pytest.raises(InputError, match="must be a parameter"):
         em.effort_of(ARCH, "theta")
     with pytest.raises(InputError, match="`ends` must be finite and in order"):
-        em.held_over(ARCH, "q", (1.0, 0.0))
+        em.stable_over(ARCH, "q", (1.0, 0.0))
     with pytest.raises(InputError, match="`limits` must be positive"):
         em.Rates({"a": 0.0})
 
@@ -146,4 +146,4 @@ def test_equal_words_are_equal_descriptors():
     disc = em.Disc((0.5, 0.2), 0.1)
     assert em.distance_to(ARCH, disc) == em.distance_to(again, disc)
     assert em.margin_of(ARCH) == em.margin_of(again)
-    assert em.held_over(ARCH, "q", (0, 1)) == em.held_over(again, "q", (0.0, 1.0))
+    assert em.stable_over(ARCH, "q", (0, 1)) == em.stable_over(again, "q", (0.0, 1.0))

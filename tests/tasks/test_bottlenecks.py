@@ -16,11 +16,11 @@ from typecheck import unchecked
 
 SPRING = em.Spring()
 LENGTH, LOAD = em.value_of(SPRING, "x_l"), em.value_of(SPRING, "F")
-SADDLE = em.combined("saddle", lambda x, d: (x - 1.1) ** 2 - d**2, LENGTH, SPRING.angle)
+SADDLE = em.function_of("saddle", lambda x, d: (x - 1.1) ** 2 - d**2, LENGTH, SPRING.angle)
 KINK = em.largest_of(
     "kink",
-    em.combined("low", lambda x, d: x - d**2, LENGTH, SPRING.angle),
-    em.combined("high", lambda x, d: 2.3 - x - d**2, LENGTH, SPRING.angle),
+    em.function_of("low", lambda x, d: x - d**2, LENGTH, SPRING.angle),
+    em.function_of("high", lambda x, d: 2.3 - x - d**2, LENGTH, SPRING.angle),
 )
 MARGIN = em.margin_of(SPRING)
 EFFORT = em.effort_of(SPRING, "x_l")
@@ -140,7 +140,7 @@ def _torque(strip):
     """Larger one of the couples of the two motors."""
     both = [em.effort_of(strip, name) for name in ("Theta", "Delta")]
     couples = [
-        abs(em.combined(f"M{s:+}", lambda a, b, s=s: 0.5 * (a + s * b), *both, unit="N mm"))
+        abs(em.function_of(f"M{s:+}", lambda a, b, s=s: 0.5 * (a + s * b), *both, unit="N mm"))
         for s in (1, -1)
     ]
     return em.largest_of("torque", *couples)

@@ -42,7 +42,7 @@ def constraint_of(kind, start, goal):
     if kind == "all loads":
         loaded = em.lift(start, {"q": 2.6}).end.state
         bound = 0.5 * (max(kappa(loaded), kappa(start)) + kappa(goal))
-        return em.held_over(arch, "q", (0.0, 2.6), [kappa <= bound])
+        return em.stable_over(arch, "q", (0.0, 2.6), [kappa <= bound])
     crown = arch.height(0.5)(start)
     descriptor = {
         "margin": em.margin_of(arch),
@@ -61,7 +61,7 @@ def test_no_task_ignores_a_constraint(scene, kind):
     arch = start.structure
     heights = (arch.height(1 / 3), arch.height(2 / 3))
     targets = {each: each(goal) for each in heights}
-    far = em.combined("far", lambda t: (t - 1.4) ** 2, em.value_of(arch, "Theta"))
+    far = em.function_of("far", lambda t: (t - 1.4) ** 2, em.value_of(arch, "Theta"))
 
     def obeyed(states):
         excess = rule.excess(states.z, states.p)

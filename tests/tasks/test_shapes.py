@@ -301,7 +301,7 @@ def test_three_segments_leave_a_curve_of_ways_to_one_tip(arm_set):
     arm = arm_set.structure
     x, y = arm.position(1.0)
     bends = [em.value_of(arm, f"k{i}") for i in (1, 2, 3)]
-    effort = em.combined("effort", lambda a, b, c: a**2 + b**2 + c**2, *bends)
+    effort = em.function_of("effort", lambda a, b, c: a**2 + b**2 + c**2, *bends)
     there = arm_set.at(k1=-0.6, k2=0.3, k3=-0.9)[0]
     goal = {x: x(there), y: y(there)}
     with unchecked():

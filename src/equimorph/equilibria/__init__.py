@@ -23,7 +23,13 @@ from equimorph.equilibria.switching import Branch, branches
 from equimorph.equilibria.trace import Traces, trace
 from equimorph.equilibria.trace_options import EventKind, TraceOptions
 from equimorph.equilibria.transitions import TransitionNetwork, transition_network
-from equimorph.equilibria.worst_cases import Corner, corners_of, held_over, worst_named, worst_over
+from equimorph.equilibria.worst_cases import (
+    Corner,
+    corners_of,
+    stable_over,
+    worst_named,
+    worst_over,
+)
 
 __all__ = [
     "Branch",
@@ -60,7 +66,6 @@ __all__ = [
     "find_equilibria",
     "fold_curve",
     "grazing_curve",
-    "held_over",
     "lift",
     "lift_legs",
     "limit_load",
@@ -68,6 +73,7 @@ __all__ = [
     "search_points",
     "settle",
     "snap_landing",
+    "stable_over",
     "trace",
     "transition_network",
     "way_points",

@@ -217,7 +217,7 @@ SAMPLES = 9
 
 
 @check_arguments
-def held_over(
+def stable_over(
     structure: Structure, name: str, ends: tuple[float, float], within: Sequence[Constraint] = ()
 ) -> Constraint:
     """Constraint that a state stays stable, and obeys others, for all values of a load in a range.
@@ -258,7 +258,7 @@ class _Range:
     within: tuple[Constraint, ...]
 
     def worst(self, z: Lanes, p: Parameters) -> Values:
-        """Worst relative excess over the range; see `held_over`."""
+        """Worst relative excess over the range; see `stable_over`."""
         out = np.full(len(z), -1.0)
         near, stable = _stable_states(self.structure, z, p)
         out[~stable] = 2.0

@@ -281,10 +281,10 @@ def are_feasible(
 
 @remember_call
 @check_arguments
-def combined(
+def function_of(
     name: str, function: Callable[..., Any], *descriptors: Descriptor, unit: str = "1"
 ) -> Descriptor:
-    """Function of descriptors: ``combined("gap", lambda a, b: a - b, one, other)``.
+    """Function of descriptors: ``function_of("gap", lambda a, b: a - b, one, other)``.
 
     Parameters
     ----------
@@ -322,9 +322,9 @@ def largest_of(name: str, *descriptors: Descriptor) -> Descriptor:
     Raises
     ------
     InputError
-        As for `combined`.
+        As for `function_of`.
     """
-    whole = combined(name, lambda *values: np.max(values, axis=0), *descriptors)
+    whole = function_of(name, lambda *values: np.max(values, axis=0), *descriptors)
     unit = descriptors[0].unit
 
     def branches(

@@ -26,7 +26,7 @@ def main(folder: Path) -> dict[str, float]:
     )
     projection = em.Projection(beside)
     failing, heights = em.Projection(around), em.DescriptorChart(around, [third, "Delta"])
-    reduced = em.reduce(around, prefer=em.highest(crown))
+    reduced = em.reduce(around, prefer=em.charts.highest(crown))
     atlas = em.dissect(around)
     panels: list[em.Chart | em.Atlas | list[em.Chart]] = [
         projection,

@@ -64,7 +64,7 @@ def gap_to(place):
     """Squared distance of the strip's tip from a height, under a load."""
     first = strip(0.02, 0.5, 0.6)
     here = em.lift(first.natural_state(), {"P": 0.05}).end.state
-    square = em.combined(f"to {place}", lambda y: (y - place) ** 2, first.height(1.0))
+    square = em.function_of(f"to {place}", lambda y: (y - place) ** 2, first.height(1.0))
     return em.StateValue(here, em.peak(square))
 
 
@@ -144,8 +144,8 @@ def test_a_question_without_an_answer_at_the_start_says_why():
 def torque(rod):
     """Larger couple of the two motors."""
     efforts = [em.effort_of(rod, name) for name in ("Theta", "Delta")]
-    first = em.combined("M_A", lambda a, b: 0.5 * (a + b), *efforts)
-    second = em.combined("M_B", lambda a, b: 0.5 * (a - b), *efforts)
+    first = em.function_of("M_A", lambda a, b: 0.5 * (a + b), *efforts)
+    second = em.function_of("M_B", lambda a, b: 0.5 * (a - b), *efforts)
     return em.largest_of("torque", abs(first), abs(second))
 
 

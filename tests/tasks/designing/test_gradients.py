@@ -121,7 +121,7 @@ def test_peaks_of_routes_have_the_gradients_of_their_passes(margin):
         up = max(eset.at(Theta=0.7, Delta=0.0).stable, key=first.height(0.5))
         down = min(eset.at(Theta=-0.7, Delta=0.0).stable, key=first.height(0.5))
         efforts = (em.effort_of(first, name) for name in ("Theta", "Delta"))
-        motor = abs(em.combined("motor A", lambda a, b: 0.5 * (a + b), *efforts))
+        motor = abs(em.function_of("motor A", lambda a, b: 0.5 * (a + b), *efforts))
         question = RouteExtreme(eset, up, down, em.peak(motor), margin=margin)
         answer = question.answer(first, ())
         assert [piece.kind for piece in answer.pieces] == ["start", "goal", "pass"]

@@ -105,7 +105,7 @@ def test_an_interior_optimum_of_a_combined_objective(arch_set):
     """(y(½) − 0.2)² + 0.01 Θ²: no better at 200 random states; KKT residual at round-off."""
     arch = arch_set.structure
     rise, turn = arch.height(0.5), em.value_of(arch, "Theta")
-    cost = em.combined("cost", lambda y, t: (y - 0.2) ** 2 + 0.01 * t**2, rise, turn)
+    cost = em.function_of("cost", lambda y, t: (y - 0.2) ** 2 + 0.01 * t**2, rise, turn)
     found = em.optimise(arch_set, cost)
     everywhere = cost(arch_set.points[arch_set.index == 0])
     assert found.best.value <= everywhere.min() + 1e-12
@@ -173,4 +173,4 @@ def test_bad_questions_are_refused(level_set_of_spring, spring_set):
     empty = em.optimise(eset, angle, within=[angle >= 3.0])
     assert (empty.status, len(empty)) == ("refused", 0)
     with pytest.raises(InputError, match="one or more of one structure"):
-        em.combined("nothing", lambda: 0.0)
+        em.function_of("nothing", lambda: 0.0)

@@ -55,7 +55,7 @@ def test_a_worst_case_that_ends_at_a_fold_is_its_limit(spring_at_load):
     """δ + 100 F is worst at F + 0.005, and least where that corner is a fold, slope infinite."""
     spring = spring_at_load.structure
     load = em.value_of(spring, "F")
-    tilted = em.combined("tilted", lambda angle, f: angle + 100.0 * f, spring.angle, load)
+    tilted = em.function_of("tilted", lambda angle, f: angle + 100.0 * f, spring.angle, load)
     found = ask(spring_at_load, tilted, {"F": 0.005})
     corner = LOAD + 0.005
     assert found.state["x_l"] == pytest.approx(edge_of(corner), abs=1e-8)

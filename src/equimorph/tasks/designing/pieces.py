@@ -179,7 +179,7 @@ def _made_again(value: Any, old: Structure, new: Structure) -> Any:
         if isinstance(each, Descriptor) and each.origin == old.signature and each.made_by is None:
             raise InputError(
                 "`family` needs descriptors that can be made for each structure: those of its "
-                f"methods, or functions of these by `combined`; got {each.name}."
+                f"methods, or functions of these by `function_of`; got {each.name}."
             )
         return each
 

@@ -155,7 +155,7 @@ def optimise(  # the knobs of the public face, all by keyword
     eset
         Equilibrium set over the parameters to choose.
     objective
-        A descriptor of the set's structure; `combined` makes new ones.
+        A descriptor of the set's structure; `function_of` makes new ones.
     sense
         "min" or "max".
     within

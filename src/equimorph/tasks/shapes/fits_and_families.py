@@ -9,7 +9,7 @@ from equimorph.manifold import Level, level_set
 from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.geometry.topology import pieces
 from equimorph.manifold.queries.nearest import SetPoints, local_minima, points_at_vertices
-from equimorph.model import Constraint, combined
+from equimorph.model import Constraint, function_of
 from equimorph.structures import States, join_states
 from equimorph.tasks.optimising.programme import Objective, Programme
 from equimorph.tasks.optimising.sqp import descend
@@ -41,7 +41,7 @@ def best_fits(
         Vertices from which to search; all if None.
     """
     eset, spread = known.eset, known.spread
-    squares = combined(
+    squares = function_of(
         "misfit",
         lambda *each: sum(
             ((value - target) / unit) ** 2
