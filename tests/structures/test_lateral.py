@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import equimorph as em
-from equimorph.structures.rod.criticality import quartic
 from equimorph.structures.rod.lateral import Holding, LateralStiffness, OutOfPlane
+from equimorph.structures.rod.space import quartic
 from oracles.spatial import dense_margin, fine_margin, rotated_energy
 
 FREE_END = ("clamped", "free")

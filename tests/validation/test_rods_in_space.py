@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import equimorph as em
-from equimorph.structures.rod.criticality import quartic
+from equimorph.structures.rod.space import quartic
 from oracles.spatial_rod import sideways_from
 
 ROUND = 1.0 / 1.3

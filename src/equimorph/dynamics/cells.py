@@ -8,10 +8,10 @@ import numpy as np
 from equimorph.array_types import Float
 from equimorph.errors import MissingError
 from equimorph.structures import LineLoad, PointForce, Rod, SpatialRod, Tendon
-from equimorph.structures.rod.construction import Construction
 from equimorph.structures.rod.ends import FREE, HELD, Holding
 from equimorph.structures.rod.profiles import LoadShape
-from equimorph.structures.spatial.effects import direction_in_space
+from equimorph.structures.rod.rod_description import Construction
+from equimorph.structures.spatial.model import direction_in_space
 
 _GAUSS, _WEIGHTS = np.polynomial.legendre.leggauss(6)
 

@@ -19,7 +19,7 @@ from equimorph.equilibria import settle
 from equimorph.errors import InputError
 from equimorph.optional_packages import load_package
 from equimorph.structures import Rod, State, States
-from equimorph.structures.rod.construction import construction
+from equimorph.structures.rod.rod_description import construction
 
 RADIUS = 0.005
 """Radius of the round section relative to the length; EA is then 4/r² times B."""

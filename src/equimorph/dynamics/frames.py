@@ -11,7 +11,7 @@ from equimorph.dynamics.linkage import Bends, Linkage, Supports
 from equimorph.dynamics.mechanism import Vector
 from equimorph.errors import MissingError
 from equimorph.structures import Frame, State, States
-from equimorph.structures.frame.inertia import member_masses
+from equimorph.structures.frame.fields import member_masses
 from equimorph.structures.frame.model import FrameModel
 from equimorph.structures.rod.units import FOUR_PI_SQUARED
 

@@ -18,9 +18,9 @@ from equimorph.dynamics.chained import PlanarChained
 from equimorph.dynamics.linkage import Bends, Linkage, Supports
 from equimorph.dynamics.mechanism import Vector
 from equimorph.structures import Couple, Curvature, Pressure, Rod, State, States, Tendon
-from equimorph.structures.rod.construction import Construction, construction
 from equimorph.structures.rod.ends import FREE, support_axes
 from equimorph.structures.rod.model import Build
+from equimorph.structures.rod.rod_description import Construction, construction
 from equimorph.structures.rod.terms import Term
 from equimorph.structures.rod.units import FOUR_PI_SQUARED
 

@@ -22,12 +22,11 @@ from equimorph.dynamics.spatial_chain import ANCHOR, REST, STIFF, Axes, SpatialC
 from equimorph.dynamics.spatial_plant import SpatialPlant
 from equimorph.errors import InputError
 from equimorph.structures import Curvature, SpatialRod, State, States, Tendon
-from equimorph.structures.rod.construction import Construction, construction
+from equimorph.structures.rod.rod_description import Construction, construction
 from equimorph.structures.rod.terms import Term
 from equimorph.structures.rod.units import FOUR_PI_SQUARED
-from equimorph.structures.spatial.effects import AXES
 from equimorph.structures.spatial.ends import support_axes
-from equimorph.structures.spatial.model import ANGLES, Build
+from equimorph.structures.spatial.model import ANGLES, AXES, Build
 from equimorph.structures.spatial.orbits import on_orbit
 from equimorph.structures.spatial.phase import PinnedMechanics
 from equimorph.structures.spatial.quaternions import exponential, product

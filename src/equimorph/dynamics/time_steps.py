@@ -10,7 +10,7 @@ from equimorph.arrays import Flags, Lanes, Parameters, Values, Velocity
 from equimorph.columns import Columns
 from equimorph.equilibria.soft_modes import metric_length
 from equimorph.structures import Structure
-from equimorph.structures.dense import dense_matrices
+from equimorph.structures.pushed import dense_matrices
 
 NEWTON_STEPS = 25
 CONVERGED = 1e-9

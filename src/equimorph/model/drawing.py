@@ -15,9 +15,8 @@ Spots = Float[np.ndarray, "lanes space"]
 """One place or direction for each state."""
 Arrays = Float[np.ndarray, "lanes places space"]
 """Several places or vectors for each state."""
-Stiffness = Float[np.ndarray, "3"]
-"""Against moves in x and y and against turning: ∞ where held, 0 where free."""
-AXES = np.eye(2)
+VISIBLE = 1e-3
+"""Share of a coordinate axis along which a support slides that its symbol may follow."""
 
 
 class SupportKind(StrEnum):
@@ -120,46 +119,47 @@ class Drawing:
 
 
 def supports_of_point(
-    stiffness: Stiffness, places: Spots, tangents: Spots, slide: float | None = None
+    held: tuple[Float[np.ndarray, "held space"], Float[np.ndarray, " held"]],
+    turning: float,
+    places: Spots,
+    inward: Spots,
 ) -> tuple[Support, ...]:
-    """Symbols of all that holds one point of a planar structure.
+    """Symbols of all that holds one point of a structure, in the plane or in space.
 
     Parameters
     ----------
-    stiffness
-        Against moves in x, in y, and turns.
+    held
+        Orthonormal directions along which the point is held, and its stiffness along these: ∞ where
+        held firmly, 0 where free.
+    turning
+        Stiffness against turning: ∞ where held, 0 where free.
     places
         Where the point is in each state.
-    tangents
+    inward
         Unit vectors that point into the structure, for a clamp.
-    slide
-        Direction in radians along which a point that is held in x and y may move all the same.
     """
-    held = np.isinf(stiffness)
-    firm, fixed = held[:2], bool(held[2])
-    found = []
-    if slide is not None:
-        kind = SupportKind.SLEEVE if fixed else SupportKind.ROLLER
-        found.append(_support(kind, places, np.array([np.cos(slide), np.sin(slide)])))
-    elif firm.all():
-        found.append(Support(SupportKind.CLAMP if fixed else SupportKind.PIN, places, tangents))
-    elif firm.any():
-        kind = SupportKind.SLEEVE if fixed else SupportKind.ROLLER
-        found.append(_support(kind, places, AXES[int(np.argmin(firm))]))
+    directions, stiffness = held
+    firm, fixed, found = directions[np.isinf(stiffness)], bool(np.isinf(turning)), []
+
+    def add(kind: SupportKind, direction: Float[np.ndarray, "..."]) -> None:
+        found.append(Support(kind, places, np.array(np.broadcast_to(direction, places.shape))))
+
+    if len(firm) == places.shape[1]:
+        add(SupportKind.CLAMP if fixed else SupportKind.PIN, inward)
+    elif len(firm):
+        across = np.eye(places.shape[1]) - firm.T @ firm
+        sliding = across[np.argmax(np.linalg.norm(across, axis=1) > VISIBLE)]
+        add(SupportKind.SLEEVE if fixed else SupportKind.ROLLER, sliding / np.linalg.norm(sliding))
     elif fixed:
-        found.append(Support(SupportKind.GRIP, places, tangents))
-    for axis, stiff in zip(AXES, stiffness[:2], strict=True):
+        add(SupportKind.GRIP, inward)
+    for direction, stiff in zip(directions, stiffness, strict=True):
         if 0.0 < stiff < np.inf:
-            found.append(_support(SupportKind.SPRING, places, axis))
-    if 0.0 < stiffness[2] < np.inf:
-        found.append(Support(SupportKind.COIL, places, tangents))
+            add(SupportKind.SPRING, direction)
+    if 0.0 < turning < np.inf:
+        add(SupportKind.COIL, inward)
     return tuple(found)
 
 
 def unit_vectors(angles: Values) -> Spots:
     """Unit vectors at angles."""
     return np.stack([np.cos(angles), np.sin(angles)], axis=1)
-
-
-def _support(kind: SupportKind, places: Spots, direction: Float[np.ndarray, "2"]) -> Support:
-    return Support(kind, places, np.tile(direction, (len(places), 1)))

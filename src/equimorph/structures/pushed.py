@@ -11,8 +11,24 @@ from equimorph.errors import InputError
 from equimorph.linalg import BorderedSolution, no_border, solve_bordered
 from equimorph.model import Descriptor, Parameter
 from equimorph.structures.contract import Structure
-from equimorph.structures.dense import dense_matrices
-from equimorph.structures.equations import AnyBorder, Direction, Shift
+from equimorph.structures.equations import AnyBorder, Direction, Equations, Shift
+
+SHIFT = -1.0
+"""Of the spectrum in units of the metric: F_z itself is singular at folds."""
+
+
+def dense_matrices(
+    equations: Equations, z: Lanes, p: Parameters
+) -> Float[np.ndarray, "lanes size size"]:
+    """F_z, from solves with it and a shift."""
+    lanes, size = len(z), equations.size
+    units = np.repeat(np.eye(size)[None], lanes, axis=0)
+    inverse = equations.solve(z, p, units, None, np.full(lanes, SHIFT)).x
+    out = np.linalg.inv(inverse.transpose(0, 2, 1))
+    at = np.arange(equations.unknowns)
+    out[:, at, at] += SHIFT * equations.mass
+    return np.asarray(out)
+
 
 Shifts = Float[np.ndarray, "shifts unknowns"]
 

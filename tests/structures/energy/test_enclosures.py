@@ -5,8 +5,7 @@ import pytest
 
 from equimorph.linalg.intervals import Interval
 from equimorph.structures import EnergyStructure
-from equimorph.structures.energy.enclosures import can_enclose, enclosure
-from equimorph.structures.energy.tape import casadi, tape
+from equimorph.structures.energy.tape import can_enclose, casadi, enclosure, tape
 from equimorph.tasks.verification.schedule_check import verify
 
 FORMULAS = [

@@ -5,7 +5,7 @@ import pytest
 
 import equimorph as em
 from equimorph.errors import InputError
-from equimorph.structures.energy.leading_form import positive_definite
+from equimorph.structures.energy.soundness import positive_definite
 from typecheck import unchecked
 
 

@@ -36,11 +36,9 @@ from equimorph.structures.energy.drawing import (
     forces_of,
     marks_of,
 )
-from equimorph.structures.energy.enclosures import can_enclose, enclosure
 from equimorph.structures.energy.expressions import POINT
-from equimorph.structures.energy.independence import DEPENDENT, SAMPLES, Independence
-from equimorph.structures.energy.leading_form import grows
-from equimorph.structures.energy.tape import Derivatives, Tape, casadi, tape
+from equimorph.structures.energy.soundness import DEPENDENT, SAMPLES, Independence, grows
+from equimorph.structures.energy.tape import Derivatives, Tape, can_enclose, casadi, enclosure, tape
 from equimorph.structures.equations import Direction, Enclosed
 
 INDEPENDENCE = "constraint_independence"

@@ -1,24 +1,263 @@
-"""The frame: rods between rigid or hinged joints, loads on them, rods that bend or lengthen."""
+"""The frame: rods between rigid or hinged joints; its loads, actuators, descriptors, symmetries."""
 
 from collections.abc import Iterable, Mapping
-from typing import Annotated
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Annotated, ClassVar
 
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
 from equimorph.argument_vocabulary import count
-from equimorph.array_types import Float
-from equimorph.arrays import Lanes, Parameters, Velocity
+from equimorph.array_types import Bool, Float, Int
+from equimorph.arrays import Lanes, Parameters, Values, Velocity
+from equimorph.errors import InputError
+from equimorph.linalg.dense import multiply
+from equimorph.model import Descriptor, remember_call
 from equimorph.structures.contract import Symmetry
-from equimorph.structures.frame.described import DescribedFrame
-from equimorph.structures.frame.inertia import frame_material, member_masses
-from equimorph.structures.frame.member import MemberSpec, SupportSpec
+from equimorph.structures.frame.any_model import Actuators, Loads
+from equimorph.structures.frame.fields import FrameFields, frame_material, member_masses
+from equimorph.structures.frame.mechanics import FrameMechanics
+from equimorph.structures.frame.member import AXES, MemberSpec, SupportSpec
 from equimorph.structures.frame.model import FrameModel
 from equimorph.structures.frame.network import frame_network
-from equimorph.structures.frame.patterns import Actuators, Loads
-from equimorph.structures.frame.symmetry import symmetries
+from equimorph.structures.images import edges_of_image, images, is_symmetry, parameter_exchange
 from equimorph.structures.network import Joints
 from equimorph.structures.unit_system import Units, unit_system
+
+
+class DescribedFrame(FrameFields):
+    """A planar frame with its descriptors, in the user's units."""
+
+    written: ClassVar[Mapping[str, str]] = {
+        "displacement(joint,axis)": "displacement",
+        "rotation(joint)": "rotation",
+        "rotation(member,joint)": "rotation",
+        "axial(member,joint)": "axial",
+        "shear(member,joint)": "shear",
+        "moment(member,joint)": "moment",
+        "max_curvature(member)": "member_curvature",
+        "max_curvature": "max_curvature",
+        "reaction(joint,axis)": "reaction",
+        "travel(load)": "travel",
+        "effort(actuator)": "effort_of",
+        "energy": "total_energy",
+    }
+
+    @check_arguments
+    @remember_call
+    def rotation(self, where: str, joint: str | None = None) -> Descriptor:
+        """Turn of a joint, or of the end of a member there, in radians."""
+        made, model = self.model.network, self.model
+        if joint is None:
+            node, name = int(model.joint_nodes[made.joint(where)]), f"rotation({where})"
+        else:
+            member, side = made.end(where, joint)
+            node = int(model.member_nodes[member, -side])
+            name = f"rotation({made.edge_names[member]},{joint})"
+        if node < 0:
+            raise InputError(
+                f"`rotation({where})` must be of a joint where a member is not hinged; name a "
+                f"member: rotation(member,{where})."
+            )
+
+        def value(z: Lanes, p: Parameters) -> Values:
+            return self.turns(z, self.scalars(z, p))[:, node].copy()
+
+        return self._make(name, "rad", value)
+
+    @check_arguments
+    def axial(self, member: str, joint: str) -> Descriptor:
+        """Axial force in a member at a joint, positive in tension."""
+        return self._end_force("axial", member, joint)
+
+    @check_arguments
+    def shear(self, member: str, joint: str) -> Descriptor:
+        """Shear force in a member at a joint, to the left of the way from its start to its end.
+
+        It is the force of what lies beyond the cross-section, toward the member's end, on what lies
+        before.
+        """
+        return self._end_force("shear", member, joint)
+
+    @remember_call
+    def _end_force(self, kind: str, member: str, joint: str) -> Descriptor:
+        model = self.model
+        at, side = model.network.end(member, joint)
+        points = model.directions.reshape(len(model.lengths), -1)
+        node, drawn = model.member_nodes[at, -side], points[at, -side]
+
+        def value(z: Lanes, p: Parameters) -> Values:
+            angle = self.turns(z, self.scalars(z, p))[:, node] + drawn
+            x, y = self.end_forces(z, p)[:, at, side].T
+            if kind == "axial":
+                return np.asarray(model.force * (x * np.cos(angle) + y * np.sin(angle)))
+            return np.asarray(model.force * (y * np.cos(angle) - x * np.sin(angle)))
+
+        return self._make(f"{kind}({model.network.edge_names[at]},{joint})", "force", value)
+
+    @check_arguments
+    @remember_call
+    def moment(self, member: str, joint: str) -> Descriptor:
+        """Bending moment in a member at a joint, positive where it bends to its left."""
+        at, side = self.model.network.end(member, joint)
+
+        def value(z: Lanes, p: Parameters) -> Values:
+            return np.asarray(self.model.energy * self.end_moments(z, p)[:, at, side])
+
+        name = f"moment({self.model.network.edge_names[at]},{joint})"
+        return self._make(name, "force·length", value)
+
+    @check_arguments
+    @remember_call
+    def reaction(self, joint: str, axis: str) -> Descriptor:
+        """Force (axis "x" or "y"), or couple ("angle"), of a support on its joint."""
+        at, along = self.model.network.support_place(joint, axis)
+
+        def value(z: Lanes, p: Parameters) -> Values:
+            if along == 2:
+                return np.asarray(self.model.energy * self.couples(z, p)[:, at])
+            return np.asarray(self.model.force * self.reactions(z, p)[:, at, along])
+
+        quantity = "force·length" if along == 2 else "force"
+        return self._make(f"reaction({joint},{axis})", quantity, value)
+
+    @property
+    def support_reactions(self) -> tuple[Descriptor, ...]:
+        """Reactions along all that supports hold or spring."""
+        network = self.model.network
+        held = np.argwhere(network.supports != 0.0).tolist()
+        return tuple(self.reaction(network.joints[at], AXES[along]) for at, along in held)
+
+    def first_move(self) -> Descriptor:
+        """The turn of the first joint that can, or the energy."""
+        model = self.model
+        for joint, node in zip(model.network.joints, model.joint_nodes.tolist(), strict=True):
+            if node >= 0 and model.place[node] >= 0:
+                return self.rotation(joint)
+        return self.total_energy
+
+
+Matrix = Float[np.ndarray, "scalars scalars"]
+
+
+def symmetries(frame: FrameMechanics) -> tuple[Symmetry, ...]:
+    """Mirror images that leave members, supports, loads and actuators as they are, up to signs."""
+    found = []
+    for name, axes, joints in images(frame.model.network.places):
+        image = _Image(frame, axes, joints)
+        if not image.possible or image.exchange is None:
+            continue
+        if is_symmetry(frame, image.apply):
+            found.append(Symmetry(name, image.apply, *image.exchange))
+    return tuple(found)
+
+
+@dataclass(frozen=True, eq=False)
+class _Image:
+    """What an image does to the members, nodes and scalars of a frame."""
+
+    frame: FrameMechanics
+    axes: Float[np.ndarray, "2"]
+    joints: Int[np.ndarray, " joints"]
+
+    @property
+    def turn(self) -> float:
+        """Sign of angles: −1 for a reflection."""
+        return float(self.axes.prod())
+
+    @cached_property
+    def _there(self) -> Int[np.ndarray, " members"] | None:
+        return edges_of_image(self.frame.model.network.ends, self.joints)
+
+    @property
+    def possible(self) -> bool:
+        """Whether members come to lie on members, and supports on equal ones."""
+        supports = self.frame.model.network.supports
+        return self._there is not None and np.array_equal(supports[self.joints], supports)
+
+    @property
+    def there(self) -> Int[np.ndarray, " members"]:
+        """The member on which each comes to lie."""
+        assert self._there is not None
+        return self._there
+
+    @cached_property
+    def reversed(self) -> Bool[np.ndarray, " members"]:
+        """Whether its start lies on the other's end."""
+        ends = self.frame.model.network.ends
+        return np.asarray(ends[self.there, 0] != self.joints[ends[:, 0]])
+
+    @cached_property
+    def exchange(
+        self,
+    ) -> tuple[Float[np.ndarray, " parameters"], Int[np.ndarray, " parameters"]] | None:
+        """Signs and order of the parameters in the image; None if the image is another frame."""
+        given, heres, mapped = self.frame.model.patterns, [], []
+        bend = self.turn * np.where(self.reversed, -1.0, 1.0)
+        for k in range(given.count):
+            vectors = (given.forces[k], given.moves[k])
+            angles = (given.couples[k], given.turns[k, :, 0])
+            here = [*vectors, *angles, given.lines[k], given.strains[k, :, 0], given.length[k]]
+            image = [np.zeros_like(each) for each in here]
+            for i, each in enumerate(vectors):
+                image[i][self.joints] = self.axes * each
+            for i, each in enumerate(angles, 2):
+                image[i][self.joints] = self.turn * each
+            image[4][self.there] = self.axes * given.lines[k]
+            image[5][self.there] = bend * given.strains[k, :, 0]
+            image[6][self.there] = given.length[k]
+            heres.append(np.concatenate([each.ravel() for each in here]))
+            mapped.append(np.concatenate([each.ravel() for each in image]))
+        return parameter_exchange(heres, mapped)
+
+    @cached_property
+    def nodes(self) -> Int[np.ndarray, " nodes"]:
+        """The node at which each comes to be."""
+        rows = self.frame.model.member_nodes
+        found = np.zeros(len(self.frame.model.place), int)
+        for row, at, back in zip(rows, self.there, self.reversed, strict=True):
+            found[row] = rows[at][::-1] if back else rows[at]
+        return found
+
+    @cached_property
+    def matrix(self) -> Matrix:
+        """Scalars (multipliers, p, 1) of the image are ``y @ matrix``.
+
+        The forces of the image are those of the frame, moved and turned; the multipliers take
+        the forces that the loads carry differently there.
+        """
+        model, (nx, ny) = self.frame.model, self.axes
+        m, count = model.multipliers, model.scalars
+        members, points = len(model.lengths), len(model.owner) // len(model.lengths)
+        assert self.exchange is not None
+        signs, order = self.exchange
+        matrix, parts = np.zeros((count, count)), []
+        matrix[m + order, range(m, count - 1)] = signs
+        matrix[-1, -1] = 1.0
+        for sign, forces in ((nx, model.forces[0]), (ny, model.forces[1])):
+            here = model.points_of(forces).reshape(members, points, count)
+            image = np.zeros_like(here)
+            for at, back, rows in zip(self.there, self.reversed, here, strict=True):
+                image[at] = -sign * rows[::-1] if back else sign * rows
+            parts.append((here.reshape(-1, count), image.reshape(-1, count)))
+        here, image = (np.concatenate([part[i] for part in parts]) for i in (0, 1))
+        wanted = image - here[:, m:] @ matrix[:, m:].T
+        if m:
+            matrix[:, :m] = np.linalg.lstsq(here[:, :m], wanted, rcond=None)[0].T
+        return matrix
+
+    def apply(self, z: Lanes, p: Parameters) -> tuple[Lanes, Parameters]:
+        """Unknowns, multipliers and parameters of the image."""
+        frame, m = self.frame, self.frame.constraints
+        scalars = frame.scalars(z, p)
+        turns, y = frame.turns(z, scalars), multiply(scalars, self.matrix)
+        image = np.empty_like(turns)
+        image[:, self.nodes] = self.turn * turns
+        # places of unknown nodes are numbered in the order of the nodes
+        unknown = image[:, frame.model.place >= 0]
+        return np.concatenate([unknown, y[:, :m]], axis=1), np.ascontiguousarray(y[:, m:-1])
+
 
 SUPPORTS = (
     "supports by joint: fixed, pinned, axes to hold (x, y or xy), or a table of x, y, angle to "

@@ -9,7 +9,7 @@ import numpy as np
 
 from equimorph.array_types import Bool, Float
 from equimorph.errors import InputError
-from equimorph.structures.frame.any_network import WEIGHT, AnyFrameNetwork
+from equimorph.structures.frame.any_model import WEIGHT, AnyFrameNetwork
 from equimorph.structures.frame.member import (
     AXES,
     Member,

@@ -28,7 +28,7 @@ from equimorph.structures.equations import (
 )
 from equimorph.structures.rod.centreline import Centreline, closest_approach, stations
 from equimorph.structures.rod.discretisation import Mesh
-from equimorph.structures.rod.heavy_rod import HeavyRod
+from equimorph.structures.rod.inertia import HeavyRod
 from equimorph.structures.rod.mechanics import RodMechanics
 from equimorph.structures.rod.sections import SectionProperties
 from equimorph.structures.rod.space_options import SpaceOptions

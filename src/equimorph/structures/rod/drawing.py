@@ -6,11 +6,12 @@ import numpy as np
 
 from equimorph.array_types import Float
 from equimorph.arrays import Lanes, Parameters, Values
-from equimorph.model import Actuator, ActuatorKind, Couples, Drawing, Forces, Support
+from equimorph.model import Actuator, ActuatorKind, Couples, Drawing, Forces
+from equimorph.model import Support as Symbol
 from equimorph.model.drawing import supports_of_point
 from equimorph.structures.rod.any_rod import AnyRod
 from equimorph.structures.rod.centreline import Centreline, Vectors
-from equimorph.structures.rod.ends import FREE, HELD, End, Holding
+from equimorph.structures.rod.ends import Support, stiffness
 from equimorph.structures.rod.terms import (
     Couple,
     Curvature,
@@ -32,7 +33,7 @@ Amplitudes = Sequence[tuple[Term, Values]]
 
 
 def rod_drawing(
-    rod: AnyRod, supports: tuple[Support, ...], amplitudes: Amplitudes, z: Lanes, p: Parameters
+    rod: AnyRod, supports: tuple[Symbol, ...], amplitudes: Amplitudes, z: Lanes, p: Parameters
 ) -> Drawing:
     """Forces and couples where they act, actuators along the rod, and the supports.
 
@@ -61,18 +62,14 @@ def rod_drawing(
     return Drawing(supports, tuple(forces), tuple(couples), actuators)
 
 
-def planar_supports(ends: tuple[End, End], line: Centreline) -> tuple[Support, ...]:
-    """Supports of both ends; `line` is the centreline at `ENDS`."""
-    found: list[Support] = []
+def rod_supports(ends: tuple[Support, Support], line: Centreline) -> tuple[Symbol, ...]:
+    """Symbols of both ends; `line` is the centreline at `ENDS`."""
+    found: list[Symbol] = []
     for side, end in enumerate(ends):
-        stiffness = np.array([_stiffness(each) for each in (end.x, end.y, end.angle)])
         inward = (1.0 - 2.0 * side) * line.tangents[:, side]
-        found += supports_of_point(stiffness, line.places[:, side], inward, end.slide)
+        places, turning = line.places[:, side], stiffness(end.turning)
+        found += supports_of_point(end.along_directions, turning, places, inward)
     return tuple(found)
-
-
-def _stiffness(holding: Holding) -> float:
-    return {HELD: np.inf, FREE: 0.0}[holding] if isinstance(holding, str) else holding
 
 
 def _direction(term: LineLoad | PointForce, axes: int) -> Float[np.ndarray, " axes"]:

@@ -10,6 +10,7 @@ import numpy as np
 from equimorph.argument_checks import check_arguments
 from equimorph.argument_kinds import one_of
 from equimorph.argument_vocabulary import POSITIVE
+from equimorph.array_types import Float
 from equimorph.errors import InputError
 
 Holding = Annotated[
@@ -30,8 +31,18 @@ class Support(ABC):
 
     @property
     @abstractmethod
+    def turning(self) -> Holding:
+        """What happens to its rotation."""
+
+    @property
+    @abstractmethod
+    def along_directions(self) -> tuple[Float[np.ndarray, "held axes"], Float[np.ndarray, " held"]]:
+        """Orthonormal directions, and the stiffness along each: ∞ where held, 0 where free."""
+
+    @property
     def holds_rotation(self) -> bool:
         """Whether the rotation of the end is prescribed."""
+        return self.turning == HELD
 
     @abstractmethod
     def data(self) -> str | dict[str, Any]:
@@ -71,9 +82,17 @@ class End(Support):
             )
 
     @property
-    def holds_rotation(self) -> bool:
-        """Whether the angle is prescribed."""
-        return self.angle == HELD
+    def turning(self) -> Holding:
+        """What happens to its angle."""
+        return self.angle
+
+    @property
+    def along_directions(self) -> tuple[Float[np.ndarray, "held 2"], Float[np.ndarray, " held"]]:
+        """Both axes, or the normal of the line on which it rolls."""
+        if self.slide is not None:
+            normal = np.array([[-np.sin(self.slide), np.cos(self.slide)]])
+            return normal, np.array([np.inf])
+        return np.eye(2), np.array([stiffness(self.x), stiffness(self.y)])
 
     def scaled(self, angle: float, force: float) -> "End":
         """The same end with its stiffnesses divided by units of moment and of force per length."""
@@ -135,6 +154,11 @@ def support_axes(ends: tuple[End, End]) -> tuple[Axis, Axis]:
     c, s = float(np.cos(slide)), float(np.sin(slide))
     along = (HELD if first.slide is None else FREE, HELD if last.slide is None else FREE)
     return Axis("", (c, s), *along), Axis("offset", (-s, c), HELD, HELD)
+
+
+def stiffness(holding: Holding) -> float:
+    """Stiffness of a support along an axis: ∞ where held, 0 where free."""
+    return {HELD: np.inf, FREE: 0.0}[holding] if isinstance(holding, str) else holding
 
 
 def compliance(holding: Holding) -> float:

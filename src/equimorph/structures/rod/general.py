@@ -30,7 +30,7 @@ from equimorph.structures.rod.inertia import following, moved_places, place_deri
 from equimorph.structures.rod.mechanics import LARGEST_TAIL, PlanarMechanics, plain_rod
 from equimorph.structures.rod.model import RodModel, pack_tables
 from equimorph.structures.rod.pressure import EnclosedArea, lower_triangle
-from equimorph.structures.rod.symmetry import symmetries
+from equimorph.structures.rod.reflections import symmetries
 from equimorph.tolerances import METRIC_DIFFERENCE
 
 Points = Float[np.ndarray, "lanes points"]

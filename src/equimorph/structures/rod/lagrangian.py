@@ -1,7 +1,7 @@
 """What the Lagrangians of rods in the plane and in space have in common."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Self
 
@@ -9,6 +9,7 @@ import numpy as np
 
 from equimorph.array_types import Float
 from equimorph.structures.rod.discretisation import Mesh
+from equimorph.structures.rod.ends import FREE, Axis, compliance
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,3 +52,64 @@ class RodLagrangian(ABC):
         self, names: Sequence[str], matrix: Float[np.ndarray, "scalars others"]
     ) -> Self:
         """The same rod in new parameters ``y``, of which its scalars are ``matrix @ y``."""
+
+
+Rows = Float[np.ndarray, "axes scalars"]
+
+
+@dataclass(frozen=True, eq=False)
+class SupportEnergy:
+    """Energy of the supports ½ yᵀ Q y, and what follows from them; rows combine the scalars y.
+
+    reaction: force of the support at A; origin: coordinates of end A, or of end B along axes in
+    which A is free (`from_start` is False).
+    """
+
+    quadratic: Float[np.ndarray, "scalars scalars"]
+    reaction: Rows
+    origin: Rows
+    from_start: tuple[bool, ...]
+
+
+def support_energy(
+    axes: Sequence[Axis], forces: Float[np.ndarray, "scalars axes"], place: Mapping[str, int]
+) -> SupportEnergy:
+    """Energy of the supports along axes in which the ends are held, free or on springs.
+
+    With λ the force of the support at A, F that of all loads, x the place of B's support, and
+    compliances c: ``−(λ + F) x − ½ c_A λ² − ½ c_B (λ + F)²``, end A at ``−c_A λ``, end B at
+    ``x + c_B (λ + F)``. Without opposed supports λ is −F or 0.
+
+    Parameters
+    ----------
+    forces
+        Total force of all loads as a combination of the scalars; multipliers come first in these.
+    place
+        Scalars of the parameters by name.
+    """
+    count, multiplier = len(forces), 0
+    quadratic = np.zeros((count, count))
+    reactions, origin = np.zeros((2, forces.shape[1], count))
+    from_start = []
+    for axis in axes:
+        unit = np.array(axis.unit)
+        total = forces @ unit
+        reaction, site = np.zeros(count), np.zeros(count)
+        if axis.opposed:
+            reaction[multiplier] = 1.0
+            site[place[axis.name]] = 1.0
+            multiplier += 1
+        elif axis.last == FREE:
+            reaction = -total
+        rest = reaction + total
+        reactions += np.outer(unit, reaction)
+        quadratic -= np.outer(rest, site) + np.outer(site, rest)
+        if axis.first != FREE:
+            quadratic -= compliance(axis.first) * np.outer(reaction, reaction)
+            origin -= compliance(axis.first) * np.outer(unit, reaction)
+        if axis.last != FREE:
+            quadratic -= compliance(axis.last) * np.outer(rest, rest)
+        if axis.first == FREE:
+            origin += compliance(axis.last) * np.outer(unit, rest)
+        from_start.append(axis.first != FREE)
+    return SupportEnergy(quadratic, reactions, origin, tuple(from_start))

@@ -2,7 +2,7 @@
 
 from abc import abstractmethod
 from collections.abc import Callable
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from equimorph.linalg.condensed import PIVOT_GUARD
 from equimorph.linalg.lanes import over_lanes
 from equimorph.structures.contract import Symmetry
 from equimorph.structures.equations import Advance, Direction, Equations
-from equimorph.structures.rod.discretisation import Mesh
+from equimorph.structures.rod.discretisation import Mesh, error_by_refinement
 
 LARGEST_TAIL = 1e-3
 """Highest Legendre coefficients of θ, in radians, of an element that represents its part."""
@@ -170,3 +170,29 @@ class PlanarMechanics(RodMechanics):
         """Largest of the two highest Legendre coefficients of θ in all elements."""
         tail = self.mesh.highest @ self.nodal_angles(z, p).T
         return np.asarray(np.abs(tail, out=tail).max(axis=0))
+
+
+SAMPLES = np.linspace(0.0, 1.0, 25)
+"""Arclengths at which fields are compared."""
+
+Rod = TypeVar("Rod", bound=RodMechanics)
+Compared = Float[np.ndarray, "lanes compared"]
+
+
+def discretisation_error(
+    rod: Rod,
+    finer: Rod,
+    compared: Callable[[Rod, Lanes, Parameters], Compared],
+    z: Lanes,
+    p: Parameters,
+) -> Values:
+    """Twice the largest change of what is compared after Newton on a finer rod."""
+    still, one, none = np.zeros((len(z), finer.size)), np.ones(len(z)), np.zeros(len(z))
+
+    def correction(at: Lanes) -> Lanes:
+        return finer.advance(at, p, np.zeros_like(p), still, one, none).dz
+
+    def change(at: Lanes) -> Values:
+        return np.asarray(np.abs(compared(finer, at, p) - compared(rod, z, p)).max(axis=1))
+
+    return error_by_refinement(rod.guess_for(finer, z, p), correction, change)

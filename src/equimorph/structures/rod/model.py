@@ -9,10 +9,9 @@ import numpy as np
 from equimorph.array_types import Bool, Float, Int
 from equimorph.structures.rod.discretisation import Mesh, reference_element
 from equimorph.structures.rod.ends import FREE, HELD, Axis, End, support_axes
-from equimorph.structures.rod.lagrangian import RodLagrangian
+from equimorph.structures.rod.lagrangian import RodLagrangian, SupportEnergy, support_energy
 from equimorph.structures.rod.pressure import closing
 from equimorph.structures.rod.profiles import LoadShape, at_nodes
-from equimorph.structures.rod.support_energy import SupportEnergy, support_energy
 from equimorph.structures.rod.terms import Effects, Term
 from equimorph.structures.rod.units import FOUR_PI_SQUARED
 

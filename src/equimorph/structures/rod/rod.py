@@ -17,11 +17,10 @@ from equimorph.structures.rod.clamped import ClampedMechanics
 from equimorph.structures.rod.described import Described
 from equimorph.structures.rod.description import PlanarDescription
 from equimorph.structures.rod.discretisation import ElementCount, mesh_with_kinks
-from equimorph.structures.rod.drawing import ENDS, Amplitudes, planar_supports, rod_drawing
+from equimorph.structures.rod.drawing import ENDS, Amplitudes, rod_drawing, rod_supports
 from equimorph.structures.rod.ends import End, EndSpec
-from equimorph.structures.rod.errors import SAMPLES, discretisation_error
 from equimorph.structures.rod.general import GeneralMechanics
-from equimorph.structures.rod.mechanics import PlanarMechanics
+from equimorph.structures.rod.mechanics import SAMPLES, PlanarMechanics, discretisation_error
 from equimorph.structures.rod.model import RodModel
 from equimorph.structures.rod.natural import Natural, Outcome, natural_arch, natural_rod
 from equimorph.structures.rod.profiles import (
@@ -315,7 +314,7 @@ class Rod(Described):
 
     def drawing(self, z: Lanes, p: Parameters) -> Drawing:
         """Supports of the ends, loads, tendons and segments that bend."""
-        supports = planar_supports(self.ends, self.centreline(z, p, ENDS))
+        supports = rod_supports(self.ends, self.centreline(z, p, ENDS))
         return rod_drawing(self, supports, self._amplitudes(p), z, p)
 
     def _amplitudes(self, p: Parameters) -> Amplitudes:

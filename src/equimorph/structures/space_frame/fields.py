@@ -8,12 +8,12 @@ import numpy as np
 from equimorph.array_types import Float
 from equimorph.arrays import Lanes, Parameters
 from equimorph.model import Support
+from equimorph.model.drawing import supports_of_point
 from equimorph.structures.frame.any_frame import AnyFrame
-from equimorph.structures.space_frame.drawing import spatial_symbols
 from equimorph.structures.space_frame.lagrangian import gathered
 from equimorph.structures.space_frame.mechanics import SpatialFrameMechanics
 from equimorph.structures.space_frame.model import SpatialFrameModel
-from equimorph.structures.space_frame.network import Turning
+from equimorph.structures.space_frame.network import SpatialNetwork, Turning
 from equimorph.structures.space_frame.statics import SpaceFlows
 from equimorph.structures.spatial.quaternions import (
     RIGHT,
@@ -21,6 +21,31 @@ from equimorph.structures.spatial.quaternions import (
     matrices,
     rotation_vectors,
 )
+
+
+def spatial_symbols(
+    made: SpatialNetwork, places: Float[np.ndarray, "lanes joints 3"]
+) -> tuple[Support, ...]:
+    """Symbols of the supports, at places of the joints."""
+    found: list[Support] = []
+    for joint, support in enumerate(made.supports):
+        if support.data:
+            here, turning = places[:, joint], np.inf if support.holds_rotation else 0.0
+            inward = np.broadcast_to(_inward(made, joint), here.shape)
+            held = support.directions, support.stiffness
+            found += supports_of_point(held, turning, here, inward)
+    return tuple(found)
+
+
+def _inward(made: SpatialNetwork, joint: int) -> Float[np.ndarray, "3"]:
+    """Mean direction from a joint into its members, as drawn."""
+    total = np.zeros(3)
+    for (start, end), chord in zip(made.ends, made.chords, strict=True):
+        unit = chord / np.linalg.norm(chord)
+        total += unit * (start == joint) - unit * (end == joint)
+    size = float(np.linalg.norm(total))
+    return total / size if size > 1e-9 else np.array([1.0, 0.0, 0.0])
+
 
 Vectors = Float[np.ndarray, "lanes elements order 3"]
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from equimorph.array_types import Float, Int
 from equimorph.errors import InputError
-from equimorph.structures.frame.any_network import WEIGHT, AnyFrameNetwork
+from equimorph.structures.frame.any_model import WEIGHT, AnyFrameNetwork
 from equimorph.structures.network import (
     Joints,
     edges_between,

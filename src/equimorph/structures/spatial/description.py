@@ -11,7 +11,6 @@ from equimorph.errors import InputError
 from equimorph.model import Parameter
 from equimorph.structures.rod.rod_description import RodDescription, check_profile_positive
 from equimorph.structures.rod.terms import Term
-from equimorph.structures.spatial.effects import check_potential
 from equimorph.structures.spatial.ends import (
     PLACES,
     Ends,
@@ -24,6 +23,7 @@ from equimorph.structures.spatial.model import (
     ANGLES,
     Build,
     SpatialModel,
+    check_potential,
     raw_model,
     raw_names,
 )

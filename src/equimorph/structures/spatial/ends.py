@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
+from equimorph.array_types import Float
 from equimorph.errors import InputError
-from equimorph.structures.rod.ends import FREE, HELD, Axis, Holding, Support
+from equimorph.structures.rod.ends import FREE, HELD, Axis, Holding, Support, stiffness
 
 AXES = ("x", "y", "z")
 PLACES = ("nu", "rise", "sideways")
@@ -44,24 +45,12 @@ class SpatialEnd(Support):
     z: Holding = HELD
 
     def __post_init__(self) -> None:
-        """Check the words and stiffnesses."""
+        """Check the word for the rotation."""
         if self.rotation not in (HELD, FREE):
             raise InputError(
                 f"`rotation` of an end must be 'held' or 'free'; got {self.rotation!r}. A spring "
                 "against rotations in space is not modelled."
             )
-        for name in AXES:
-            value = getattr(self, name)
-            if value in (HELD, FREE):
-                continue
-            number = np.nan
-            if isinstance(value, int | float) and not isinstance(value, bool):
-                number = float(value)
-            if not 0.0 < number < np.inf:
-                raise InputError(
-                    f"`{name}` of an end must be 'held', 'free' or the stiffness of a spring, a "
-                    f"positive number; got {value!r}."
-                )
 
     @property
     def turns(self) -> bool:
@@ -69,9 +58,14 @@ class SpatialEnd(Support):
         return self.rotation == FREE
 
     @property
-    def holds_rotation(self) -> bool:
-        """Whether the rotation is prescribed."""
-        return self.rotation == HELD
+    def turning(self) -> Holding:
+        """What happens to its rotation."""
+        return self.rotation
+
+    @property
+    def along_directions(self) -> tuple[Float[np.ndarray, "3 3"], Float[np.ndarray, "3"]]:
+        """The three axes."""
+        return np.eye(3), np.array([stiffness(self.along(axis)) for axis in AXES])
 
     def along(self, axis: str) -> Holding:
         """What happens to a coordinate."""

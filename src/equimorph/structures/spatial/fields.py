@@ -10,9 +10,8 @@ from equimorph.array_types import Float
 from equimorph.arrays import Lanes, Parameters, Values
 from equimorph.linalg.lanes import over_lanes
 from equimorph.structures.spatial.field_kernels import fields_lanes
-from equimorph.structures.spatial.mechanics import SpatialMechanics
+from equimorph.structures.spatial.mechanics import SpatialMechanics, field_tables, pairs_of
 from equimorph.structures.spatial.quaternions import matrices
-from equimorph.structures.spatial.tables import field_tables, pairs_of
 
 STATIONS = 5
 """Places a node at which curvatures are compared first."""

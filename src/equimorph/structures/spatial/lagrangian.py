@@ -5,6 +5,7 @@ rotation of a node is q/|q|, so that z + dz is a state for every dz; the energy 
 keeps lengths at 1, and is zero at equilibria. See docs/decisions.md, "Rotations in space".
 """
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from equimorph.arrays import Flags, Lanes, Parameters, Scalars, Values
 from equimorph.structures.contract import Symmetry
 from equimorph.structures.equations import Direction
 from equimorph.structures.rod.mechanics import RodMechanics
+from equimorph.structures.rod.reflections import Images, Reflection, find_symmetries, is_equal
 from equimorph.structures.spatial.model import SpatialModel
 from equimorph.structures.spatial.quaternions import (
     FRAME,
@@ -25,7 +27,6 @@ from equimorph.structures.spatial.quaternions import (
     normalised,
     product,
 )
-from equimorph.structures.spatial.symmetry import symmetries
 
 LENGTH_STIFFNESS = 100.0
 """k: lengths of quaternions are the stiffer in the metric, the nearer Newton's steps are to those
@@ -268,3 +269,61 @@ class SpatialLagrangian(RodMechanics):
     def symmetries(self) -> tuple[Symmetry, ...]:
         """Mirror images and half turns that leave the Lagrangian as it is."""
         return symmetries(self.model, self.unknowns)
+
+
+CANDIDATES = (
+    Reflection("mirror", np.array([-1.0, 1.0, 1.0])),
+    Reflection("sideways mirror", np.array([1.0, 1.0, -1.0])),
+    Reflection("half turn about y", np.array([-1.0, 1.0, -1.0])),
+    Reflection("reflection", np.array([1.0, -1.0, 1.0])),
+    Reflection("half turn about z", np.array([-1.0, -1.0, 1.0])),
+    Reflection("half turn about x", np.array([1.0, -1.0, -1.0])),
+    Reflection("inversion", np.array([-1.0, -1.0, -1.0])),
+)
+
+
+def symmetries(model: SpatialModel, unknowns: int) -> tuple[Symmetry, ...]:
+    """Symmetries among the `CANDIDATES` that the rod has.
+
+    With a reflection M = diag(±1, ±1, ±1) a state R(s) has the image M R M, taken at s or at 1 − s:
+    the latter where M turns x round. Its strains are ± det(M) M u, its tangents ± M t with + at s.
+    """
+    images = Images(partial(_features, model), _is_reversible(model), _image)
+    return find_symmetries(model, unknowns, CANDIDATES, images)
+
+
+def _axial(by: Reflection) -> Float[np.ndarray, "3"]:
+    """Signs of the vector part of quaternions, and of the angles twist, tilt, theta."""
+    return np.asarray(by.signs.prod() * by.signs)
+
+
+def _image(by: Reflection, unknowns: Lanes) -> Lanes:
+    lanes, size = unknowns.shape
+    q = unknowns.reshape(lanes, size // 4, 4)[:, :: by.step] * np.append(1.0, _axial(by))
+    return np.asarray(q.reshape(lanes, size))
+
+
+def _features(model: SpatialModel, by: Reflection) -> Float[np.ndarray, "scalars some"]:
+    """Coefficients of all scalars, in the image of the rod."""
+    rows, step = np.s_[:, :: by.step, :: by.step], by.step
+    weights = model.mesh.element_weights[..., None]
+    turned = _axial(by)[::-1, None] * model.turned[::step]
+    parts = (
+        (weights * model.force)[rows] * (step * by.signs),
+        (weights * model.moment)[rows] * (step * _axial(by)),
+        (weights[..., 0] * model.tension)[rows],
+        (weights[..., 0] * model.torsion)[rows],
+        np.moveaxis(turned, -1, 0),
+    )
+    return np.concatenate([each.reshape(model.scalars, -1) for each in parts], axis=1)
+
+
+def _is_reversible(model: SpatialModel) -> bool:
+    """Whether stiffnesses, supports and mesh are symmetric."""
+    return (
+        model.held[0] == model.held[1]
+        and all(model.from_start)
+        and is_equal(model.stiffness, model.stiffness[::-1, ::-1])
+        and is_equal(model.softness, model.softness[::-1, ::-1])
+        and is_equal(model.mesh.lengths, model.mesh.lengths[::-1])
+    )

@@ -13,15 +13,14 @@ from equimorph.errors import InputError
 from equimorph.model import Drawing, parameter_vector
 from equimorph.structures.discrete import correct_at_parameters
 from equimorph.structures.rod.discretisation import ElementCount
-from equimorph.structures.rod.drawing import ENDS, rod_drawing
-from equimorph.structures.rod.errors import SAMPLES, discretisation_error
+from equimorph.structures.rod.drawing import ENDS, rod_drawing, rod_supports
+from equimorph.structures.rod.mechanics import SAMPLES, discretisation_error
 from equimorph.structures.rod.profiles import LoadSpec, MeasuredProfile, ProfileSpec, load_shape
 from equimorph.structures.rod.sections import CrossSection
 from equimorph.structures.rod.space_options import SpaceOptions
 from equimorph.structures.rod.terms import LineLoad, Term, Terms
 from equimorph.structures.spatial.described import DescribedInSpace
 from equimorph.structures.spatial.description import SpatialDescription
-from equimorph.structures.spatial.drawing import spatial_supports
 from equimorph.structures.spatial.ends import Ends
 from equimorph.structures.spatial.fields import SpatialFields
 from equimorph.structures.spatial.mechanics import SpatialMechanics
@@ -324,7 +323,7 @@ class SpatialRod(DescribedInSpace):
 
     def drawing(self, z: Lanes, p: Parameters) -> Drawing:
         """Supports of the ends, loads, tendons and segments that bend."""
-        supports = spatial_supports(self.ends, self.centreline(z, p, ENDS))
+        supports = rod_supports(self.ends, self.centreline(z, p, ENDS))
         return rod_drawing(self, supports, self.description.amplitudes(p), z, p)
 
     @property

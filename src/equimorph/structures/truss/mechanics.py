@@ -10,7 +10,7 @@ from equimorph.arrays import Entries, Flags, Lanes, Parameters, Values
 from equimorph.linalg.dense import multiply
 from equimorph.linalg.intervals import Interval, product, square, symmetric
 from equimorph.linalg.sparse import SparseLayout
-from equimorph.model import Actuator, ActuatorKind, Drawing, Forces, Support, SupportKind
+from equimorph.model import Actuator, ActuatorKind, Drawing, Forces, Support
 from equimorph.model.drawing import supports_of_point
 from equimorph.structures.any_network import AnyNetwork
 from equimorph.structures.contract import Growth, Symmetry
@@ -254,15 +254,11 @@ class TrussMechanics(AnyNetwork):
         """Supports of the joints, forces on them, and bars that change their length."""
         made, places = self.network, self.joint_places(z)
         supports: list[Support] = []
+        axes = np.eye(made.space)
         for joint, held in enumerate(made.held):
-            here = places[:, joint]
-            if made.space == 3 and held.any():
-                kind = SupportKind.PIN if held.all() else SupportKind.ROLLER
-                free = np.eye(3)[int(np.argmin(held))]
-                supports.append(Support(kind, here, np.tile(free, (len(z), 1))))
-            elif held.any():
-                stiffness = np.where([*held, False], np.inf, 0.0)
-                supports += supports_of_point(stiffness, here, np.tile([1.0, 0.0], (len(z), 1)))
+            firm = axes[held], np.full(held.sum(), np.inf)
+            inward = np.broadcast_to(axes[0], (len(z), made.space))
+            supports += supports_of_point(firm, 0.0, places[:, joint], inward)
         forces = self.moves_of(multiply(p, self.pulls))
         moved = np.flatnonzero(self.rates.any(axis=1))
         at = np.flatnonzero(self.moves_of(self.pulls).any(axis=(0, 2)))
