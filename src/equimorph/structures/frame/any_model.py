@@ -1,4 +1,4 @@
-"""What planar frames and frames in space have in common: networks, effects of parameters, numbers."""
+"""Planar frames and frames in space have in common: networks, effects of parameters, numbers."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
