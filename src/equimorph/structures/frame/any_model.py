@@ -1,4 +1,4 @@
-"""Planar frames and frames in space have in common: networks, effects of parameters, numbers."""
+"""Common to planar frames and frames in space: networks, effects of parameters, numbers."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence

@@ -1,4 +1,4 @@
-"""Stability of a rod out of its plane: descriptors, and whether it snaps when it leaves its plane."""
+"""Stability of a rod out of its plane: descriptors, and whether it snaps on leaving its plane."""
 
 from dataclasses import dataclass
 from functools import partial
