@@ -106,6 +106,38 @@ def test_a_film_needs_frames_and_speed(spring_set, route, tmp_path, wrong):
         plotting.film(route, tmp_path / "film.gif", spring_set, **wrong)
 
 
+def program(folder, monkeypatch, lines):
+    """A program called ffmpeg of a few lines of shell, the only one that can be found."""
+    file = folder / "ffmpeg"
+    file.write_text(f"#!/bin/sh\n{lines}\n")
+    file.chmod(0o755)
+    monkeypatch.setenv("PATH", f"{folder}:/bin:/usr/bin" if lines else "")
+
+
+def test_a_film_is_an_mp4_where_ffmpeg_is_there(route, tmp_path, monkeypatch):
+    """Its last argument is the file to write."""
+    program(tmp_path, monkeypatch, 'for last; do :; done; echo film > "$last"')
+    file = plotting.film(route, tmp_path / "film.mp4", frames=2)
+    assert file.read_text() == "film\n"
+    assert not list(tmp_path.glob("*.gif"))
+
+
+def test_what_ffmpeg_cannot_do_is_said(route, tmp_path, monkeypatch):
+    program(tmp_path, monkeypatch, "echo first >&2; echo Unknown encoder >&2; exit 1")
+    with pytest.raises(OSError, match=r"ffmpeg cannot write film\.mp4: Unknown encoder"):
+        plotting.film(route, tmp_path / "film.mp4", frames=2)
+
+
+def test_other_films_are_refused(route, tmp_path, monkeypatch):
+    program(tmp_path, monkeypatch, "")
+    with pytest.raises(InputError, match=r"must end in \.gif \(\.mp4 needs the program ffmpeg\)"):
+        plotting.film(route, tmp_path / "film.mp4")
+    program(tmp_path, monkeypatch, "exit 0")
+    with pytest.raises(InputError, match=r"end in \.gif or \.mp4; got 'film\.avi'"):
+        plotting.film(route, tmp_path / "film.avi")
+    assert sorted(each.name for each in tmp_path.iterdir()) == ["ffmpeg"]
+
+
 def test_one_shape_is_too_few(route):
     with pytest.raises(InputError, match="`count` must be at least 2; got 1"):
         plotting.shapes(route, count=1)

@@ -11,6 +11,7 @@ from PIL import Image
 
 from equimorph import plotting
 from equimorph.errors import InputError
+from equimorph.plotting.moving import suffixes
 from equimorph.storage import read_results, read_schedule
 from equimorph.study import Outcome, run_study
 from studies import only_route
@@ -60,8 +61,9 @@ def test_a_run_leaves_all_its_files(finished: tuple[Outcome, Path]):
     figures = [f"{name}.{kind}" for name in [*FIGURES, "over-margins"] for kind in ("png", "svg")]
     others = ["results.h5", "over-schedule.csv", "over-schedule.json", "index.html", "study.toml"]
     others += ["explorer.html", "results.vtkhdf"]
+    films = [f"over-film{suffix}" for suffix in suffixes()]
     assert sorted(file.name for file in out.iterdir()) == sorted(
-        [*figures, *others, "over-film.gif", "equimorph.json", ".equimorph"]
+        [*figures, *others, *films, "equimorph.json", ".equimorph"]
     )
 
 

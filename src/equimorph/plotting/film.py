@@ -24,6 +24,7 @@ from equimorph.plotting import style
 from equimorph.plotting.counts import hatch_cut, shade_regions
 from equimorph.plotting.curves import path_of, states_along, track
 from equimorph.plotting.labels import descriptor_label, parameter_label, symbol
+from equimorph.plotting.moving import film_file, write_film
 from equimorph.plotting.plane import draw_folds, draw_track, frame_plane
 from equimorph.plotting.surroundings import Moving, Surroundings, frame_shapes, obstacles_of
 from equimorph.plotting.viewpoint import draw_triad
@@ -42,12 +43,6 @@ _NUMBER_WIDTH = 0.085
 """Width of a number, as a share of the frame."""
 _LONGEST_UNIT = 4
 """Characters of a unit that has room behind its number."""
-_COLOURS = 64
-"""Size of the palette that all frames share."""
-_PAUSE_FIRST, _PAUSE_LAST = 0.8, 1.6
-"""Seconds for which the first and the last frame are shown."""
-_HUNDREDTHS = 10
-"""Milliseconds in a hundredth of a second, the unit of time in GIF files."""
 
 
 @check_arguments
@@ -59,7 +54,7 @@ def film(
     frames: int = 72,
     fps: int = 20,
 ) -> FilePath:
-    """Write an animated GIF: the structure on the left, its point in the parameter plane right.
+    """Write a film: the structure on the left, its point in the parameter plane on the right.
 
     Every frame shows an equilibrium of the route, at even distances along it. Without a set the
     point moves over the parameter that changes most, at the height of the structure's elevation.
@@ -69,7 +64,7 @@ def film(
     route
         A route with a path, or a lifted path.
     path
-        File to write; its folder must exist.
+        File to write, a GIF, or an MP4 if the program ffmpeg is there; its folder must exist.
     eset
         The equilibrium set on whose parameter plane the route is shown, if there is one.
     frames
@@ -84,15 +79,16 @@ def film(
     Raises
     ------
     InputError
-        If the route has no path, or `frames` or `fps` is too small.
+        If the route has no path, `frames` or `fps` is too small, or the file cannot be of the kind
+        that its name says.
     """
+    file = film_file(path)
     states = states_along(path_of(route), frames)
     board = _Board(route, eset)
     with style.house_style(_LARGER):
         stage = _set_stage(states, board)
         pictures = _pictures(stage, states, board)
-    file = FilePath(path)
-    write_gif(pictures, file, durations(frames, fps))
+    write_film(pictures, file, fps)
     return file
 
 
@@ -261,20 +257,3 @@ def _place_readings(
             figure.text(x + 0.008, y, reading.unit, ha="left")
     printed = [[r.form.format(x).replace("-", "−") for x in r.values] for r in readings]
     return tuple(texts), list(zip(*printed, strict=True))
-
-
-def durations(frames: int, fps: int) -> list[int]:
-    """Milliseconds that each picture stays; start and goal stay longer."""
-    each = max(2, round(100 / fps)) * _HUNDREDTHS
-    return [int(1000 * _PAUSE_FIRST), *[each] * (frames - 2), int(1000 * _PAUSE_LAST)]
-
-
-def write_gif(pictures: list[Image.Image], file: FilePath, durations: list[int]) -> None:
-    """Write an endless GIF with one palette, so that still parts cost nothing."""
-    # The palette is made from pictures all along the way: none of the colours is missed.
-    sample = [np.asarray(pictures[k]) for k in np.linspace(0, len(pictures) - 1, 4).astype(int)]
-    palette = Image.fromarray(np.concatenate(sample)).quantize(_COLOURS, Image.Quantize.MAXCOVERAGE)
-    reduced = [each.quantize(palette=palette, dither=Image.Dither.NONE) for each in pictures]
-    reduced[0].save(
-        file, save_all=True, append_images=reduced[1:], duration=durations, loop=0, optimize=False
-    )

@@ -13,7 +13,7 @@ from equimorph.argument_checks import check_arguments
 from equimorph.array_types import Float
 from equimorph.dynamics import Replay
 from equimorph.plotting import style
-from equimorph.plotting.film import durations, write_gif
+from equimorph.plotting.moving import film_file, write_film
 from equimorph.plotting.viewpoint import viewpoint_of
 from equimorph.tasks.timing.speed import SpeedLimit
 
@@ -87,14 +87,14 @@ def deviation_over_time(
 
 @check_arguments
 def replay_film(played: Replay, path: str | Path, *, frames: int = 60, fps: int = 20) -> Path:
-    """Write an animated GIF: the structure in the simulator over its equilibria, and the deviation.
+    """Write a film: the structure in the simulator over its equilibria, and the deviation.
 
     Parameters
     ----------
     played
         The replay.
     path
-        File to write; its folder must exist.
+        File to write, a GIF, or an MP4 if the program ffmpeg is there; its folder must exist.
     frames
         Number of pictures, at least 2.
     fps
@@ -103,7 +103,13 @@ def replay_film(played: Replay, path: str | Path, *, frames: int = 60, fps: int 
     Returns
     -------
     The file.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be of the kind that its name says.
     """
+    file = film_file(path)
     shown = np.unique(np.linspace(0, len(played.times) - 1, frames).round().astype(int))
     figure = Figure(figsize=(_WIDTH, _HEIGHT), dpi=_DOTS)
     canvas: Any = FigureCanvasAgg(figure)  # matplotlib's canvas has no types
@@ -127,8 +133,8 @@ def replay_film(played: Replay, path: str | Path, *, frames: int = 60, fps: int 
         now.set_data([played.times[k]], [max(played.deviation[k], 0.0)])
         canvas.draw()
         pictures.append(Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB"))
-    write_gif(pictures, Path(path), durations(len(pictures), fps))
-    return Path(path)
+    write_film(pictures, file, fps)
+    return file
 
 
 def _lines(

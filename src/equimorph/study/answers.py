@@ -3,7 +3,6 @@
 from collections.abc import Mapping, Sequence
 from functools import partial
 from html import escape
-from pathlib import Path
 from typing import Literal
 
 from equimorph import plotting
@@ -12,7 +11,7 @@ from equimorph.model import Descriptor
 from equimorph.plotting.curves import snap_steps
 from equimorph.structures import State, States
 from equimorph.study import html
-from equimorph.study.question import Figure, Question, still
+from equimorph.study.question import Figure, Question, moving, still
 from equimorph.tasks.motion.tracking import Tracking
 from equimorph.tasks.route import Route
 from equimorph.tasks.verification.schedule_check import Verification
@@ -85,14 +84,10 @@ def figures_of_way(eset: EquilibriumSet | None, name: str, route: Route, what: s
         return [still(f"{name}-parameters", draw, caption), shapes, margins]
     draw_plane = partial(plotting.parameter_plane, eset, route)
     caption = f"The {what} on the plane of the free parameters."
-    plane, gif = still(f"{name}-plane", draw_plane, caption), f"{name}-film.gif"
-    draw_film = partial(_draw_film, eset, route, gif)
-    film = Figure((gif,), draw_film, f"The structure along the {what}.", wide=True)
+    plane = still(f"{name}-plane", draw_plane, caption)
+    draw_film = partial(plotting.film, route, eset=eset)
+    film = moving(f"{name}-film", draw_film, f"The structure along the {what}.")
     return [plane, shapes, margins, film] if route.arrived else [plane]
-
-
-def _draw_film(eset: EquilibriumSet, route: Route, name: str, folder: Path) -> None:
-    plotting.film(route, folder / name, eset=eset)
 
 
 def snaps_in_words(route: Route) -> str:

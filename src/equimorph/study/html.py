@@ -24,6 +24,7 @@ EXPLANATION = (
 BOLD = re.compile(r"\*\*(.+?)\*\*")
 """What is bold on page and screen, in the words on an answer."""
 _MEDIA = {".png": "image/png", ".gif": "image/gif"}
+_LARGER = {".png": ".svg", ".gif": ".mp4"}
 
 
 def page(title: str, body: Sequence[str]) -> str:
@@ -71,17 +72,19 @@ def figure(file: Path, caption: str, *, larger: str = "", wide: bool = False) ->
 def pictures(folder: Path, wide: Mapping[str, str], small: Mapping[str, str]) -> str:
     """Return those of some pictures that are in a folder, by file name with their captions.
 
-    A PNG links to the SVG of the same name.
+    A PNG links to the SVG of the same name, a GIF to the MP4 if there is one.
     """
     shown = [
-        figure(
-            folder / name, text, larger=name.replace(".png", ".svg") * name.endswith(".png"),
-            wide=name in wide,
-        )
+        figure(folder / name, text, larger=_larger(folder / name), wide=name in wide)
         for name, text in {**wide, **small}.items()
         if (folder / name).exists()
-    ]  # fmt: skip
+    ]
     return f'<div class="figures">{"".join(shown)}</div>'
+
+
+def _larger(file: Path) -> str:
+    other = file.with_suffix(_LARGER[file.suffix])
+    return other.name if other.suffix == ".svg" or other.exists() else ""
 
 
 def found_line(words: str) -> str:

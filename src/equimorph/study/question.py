@@ -23,6 +23,7 @@ from rich.markup import escape as plain
 from equimorph import plotting
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Constraint, Descriptor, Progress, Schedule, Workers
+from equimorph.plotting.moving import convert, suffixes
 from equimorph.storage import write_schedule
 from equimorph.storage.files import write_csv
 from equimorph.structures import Structure
@@ -68,6 +69,19 @@ def still(name: str, draw: Callable[[], Drawing], caption: str, *, wide: bool = 
 
 def _save(draw: Callable[[], Drawing], name: str, folder: Path) -> None:
     plotting.save(draw(), folder, name)
+
+
+def moving(name: str, draw: Callable[[Path], object], caption: str) -> Figure:
+    """Figure that moves, as GIF and, where ffmpeg is there, as MP4; it takes a whole row."""
+    files = tuple(name + suffix for suffix in suffixes())
+    return Figure(files, partial(_film, draw, files), caption, wide=True)
+
+
+def _film(draw: Callable[[Path], object], files: tuple[str, ...], folder: Path) -> None:
+    gif, *others = (folder / each for each in files)
+    draw(gif)
+    for other in others:
+        convert(gif, other)
 
 
 def pictures(folder: Path, figures: Sequence[Figure]) -> list[str]:

@@ -18,7 +18,7 @@ from equimorph.study import html
 from equimorph.study.answers import as_route, figures_of_way, place_of
 from equimorph.study.fields import Positive
 from equimorph.study.lookup import at_key
-from equimorph.study.question import DataTable, Figure, Kind, Question, still
+from equimorph.study.question import DataTable, Figure, Kind, Question, moving, still
 from equimorph.tables import Table, units_of
 from equimorph.tasks.timing.retiming import retime
 from equimorph.tasks.verification.schedule_check import Verification
@@ -106,13 +106,13 @@ class ReplayKind(Kind[Replay]):
     ) -> list[Figure]:
         """Deviation over time, and a film beside the statics."""
         del eset
-        name = f"{question.files}-film.gif"
         deviation = still(
             f"{question.files}-deviation", partial(plotting.deviation_over_time, answer),
             "Largest distance of a point from its equilibrium, over time.",
         )  # fmt: skip
         caption = "The structure in the simulator, and in grey its equilibria."
-        return [deviation, Figure((name,), partial(_film, answer, name), caption, wide=True)]
+        shown = partial(plotting.replay_film, answer)
+        return [deviation, moving(f"{question.files}-film", shown, caption)]
 
     def words(self, question: Question, answer: Replay) -> str:
         """Say how far it was from its equilibria."""
@@ -141,7 +141,3 @@ class ReplayKind(Kind[Replay]):
         columns |= {each: getattr(answer, each) for each in parts}
         units = units_of(answer.structure.parameters) | {"time": answer.structure.time_unit}
         return [DataTable(f"{question.files}.csv", "deviation over time", Table(columns, units))]
-
-
-def _film(played: Replay, name: str, folder: Path) -> None:
-    plotting.replay_film(played, folder / name)
