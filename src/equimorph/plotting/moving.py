@@ -75,8 +75,8 @@ def convert(gif: Path, mp4: Path) -> None:
     OSError
         If ffmpeg cannot, with its last line.
     """
-    command = ["ffmpeg", "-y", "-loglevel", "error", "-i", gif, "-vf", EVEN]
-    command += ["-pix_fmt", "yuv420p", "-movflags", "+faststart", mp4]
+    command = ["ffmpeg", "-y", "-loglevel", "error", "-i", str(gif), "-vf", EVEN]
+    command += ["-pix_fmt", "yuv420p", "-movflags", "+faststart", str(mp4)]
     ran = subprocess.run(command, capture_output=True, text=True, check=False)
     if ran.returncode:
         raise OSError(f"ffmpeg cannot write {mp4.name}: {ran.stderr.strip().splitlines()[-1]}")
