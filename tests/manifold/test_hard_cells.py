@@ -93,14 +93,15 @@ def _tongue(generator: np.random.Generator) -> tuple[EnergyStructure, float, Pla
 
 
 @pytest.mark.parametrize(
-    "seeds", [range(2), pytest.param(range(2, 50), marks=pytest.mark.slow)], ids=["few", "many"]
+    "seeds",
+    [(2, 37), pytest.param((*range(2), *range(3, 37), *range(38, 50)), marks=pytest.mark.slow)],
+    ids=["few", "many"],
 )
 def test_tongues_narrower_than_cells_are_lifted_whole(seeds):
-    """Random tongues, closed forms; at 0.003 of the box beside the tip one in fifty may be lost.
+    """Random tongues, closed forms, at places from 0.003 of the box beside the tip on.
 
-    There the straight cells miss the sharp bend of the fold by more than their own size.
+    There folds bulge out of their chords by half of their length: bands of queries hold that.
     """
-    lost = asked = 0
     for seed in seeds:
         generator = np.random.default_rng([5, seed])
         structure, width, axis = _tongue(generator)
@@ -108,12 +109,7 @@ def test_tongues_narrower_than_cells_are_lifted_whole(seeds):
         with unchecked():
             eset = equilibrium_set(structure, Box(p=(-1, 1), r=(-1, 1)), intervals=intervals)
         assert eset.audit.clean, (seed, width, eset.audit)
-        over = [len(eset.at(p=p, r=r)) for p, r in axis]
-        assert all(count in {1, 3} for count in over), (seed, width, over)
-        lost += sum(count == 1 for count in over)
-        assert over[1:] == [3] * (len(over) - 1), (seed, width, over)
-        asked += 1
-    assert lost <= asked / 50
+        assert [len(eset.at(p=p, r=r)) for p, r in axis] == [3] * len(axis), (seed, width)
 
 
 @pytest.mark.slow

@@ -154,8 +154,9 @@ def _ranges(start: Items, number: Items) -> Int[np.ndarray, " m"]:
     return np.asarray(np.arange(int(number.sum())) + np.repeat(start - before, number))
 
 
-BEND = 0.25
-"""Width of a band over the length of its facet and the angle to the next: an arc takes half."""
+BEND, STEEPEST = 0.25, np.radians(75.0)
+"""Height, over its base, of a parabola with slope 1 at both ends: bands hold those which begin as
+steep as the next facet goes on, which is twice what an arc takes; largest angle for that."""
 ASIDE = 0.3
 """How far beyond the ends of its facet a band reaches, in barycentric coordinates."""
 
@@ -185,7 +186,7 @@ class Rims:
         width = np.ptp(x, axis=0) if len(x) else np.ones(x.shape[1])
         unit = x / np.where(width > 0.0, width, 1.0)
         length = _lengths(unit[facets])
-        share = BEND * np.minimum(_turns(unit, facets), np.pi)
+        share = BEND * np.tan(np.minimum(_turns(unit, facets), STEEPEST))
         apex = unit[facets].mean(axis=1) + length[:, None] * _normals(unit[facets])
         corners = np.concatenate([apex[:, None], unit[facets]], axis=1)
         overhang = np.full(corners.shape[:2], ASIDE)
