@@ -12,6 +12,7 @@ from scipy.special import gammaln, xlogy
 
 from equimorph.argument_checks import check_arguments
 from equimorph.array_types import Bool, Float, Int
+from equimorph.equilibria.gradient_flow import QUICK, Pace
 from equimorph.equilibria.legs import check_isolated
 from equimorph.equilibria.minima_graph import Argument, MinimaGraph, arguments_of, contradicts
 from equimorph.equilibria.random_search import BEYOND, UNRESOLVED, Ground, Pools, distinct
@@ -248,10 +249,12 @@ def search_with_graph(
     starts: int,
     runs: int,
     seed: int,
+    pace: Pace = QUICK,
 ) -> tuple[list[FoundStates], MinimaGraph]:
     """What `search_points` finds, and the graph of all states that served it.
 
-    The graph has also states beyond the constraints, as far as descents and lines met them.
+    The graph has also states beyond the constraints, as far as descents, at a pace, and lines met
+    them.
     """
     check_isolated(structure, points)
     generator, guesses = np.random.default_rng(seed), -(-starts // runs)
@@ -267,16 +270,17 @@ def search_with_graph(
         todo = np.array([point for point in todo if catches[point].doubtful], dtype=int)
         if len(todo) == 0:
             break
-    return _complete_by_arguments(Ground(structure, points, tuple(within)), catches, generator)
+    ground = Ground(structure, points, tuple(within))
+    return _complete_by_arguments(ground, catches, generator, pace)
 
 
 def _complete_by_arguments(
-    ground: Ground, catches: list["_Catch"], generator: np.random.Generator
+    ground: Ground, catches: list["_Catch"], generator: np.random.Generator, pace: Pace
 ) -> tuple[list[FoundStates], MinimaGraph]:
     """What was found, with what the arguments add that no stable state is missing."""
     group = np.repeat(np.arange(len(catches)), [len(catch.z) for catch in catches])
     found = [np.zeros((0, ground.structure.size)), *(catch.z for catch in catches)]
-    graph = MinimaGraph(ground, np.concatenate(found), group)
+    graph = MinimaGraph(ground, np.concatenate(found), group, pace)
     pushed = 0
     for _ in range(COMPLETIONS):
         known = len(graph)

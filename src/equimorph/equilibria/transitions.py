@@ -16,7 +16,7 @@ from equimorph.arrays import Flags, Values
 from equimorph.equilibria.descents import NUDGES, descend
 from equimorph.equilibria.energy_barriers import EnergyBarrier, EnergyPath, Merge
 from equimorph.equilibria.gradient_flow import FAITHFUL, SMOOTH
-from equimorph.equilibria.minima_graph import NONE, Argument, MinimaGraph, arguments_of
+from equimorph.equilibria.minima_graph import NONE, Argument, arguments_of
 from equimorph.equilibria.search import Completeness, search_with_graph
 from equimorph.equilibria.soft_modes import metric_length
 from equimorph.equilibria.ways import Nowhere, ways_over
@@ -249,9 +249,7 @@ def transition_network(
     0.02
     """
     point = parameter_vector(structure.parameters, at)[None]
-    (found,), known = search_with_graph(structure, point, within, starts, runs, seed)
-    graph = MinimaGraph(known.ground, known.z, known.group, FAITHFUL)
-    graph.descend()
+    (found,), graph = search_with_graph(structure, point, within, starts, runs, seed, FAITHFUL)
     p = np.tile(point, (len(graph), 1))
     order = np.argsort(structure.energy(graph.z, p), kind="stable")
     place, ends = np.argsort(order), dict[int, list[int]]()
