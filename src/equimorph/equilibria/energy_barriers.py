@@ -9,8 +9,10 @@ from typing import Literal
 
 import numpy as np
 
+from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Values
 from equimorph.equilibria.soft_modes import metric_length
+from equimorph.errors import InputError
 from equimorph.structures import State, States
 
 Status = Literal[
@@ -117,3 +119,19 @@ class EnergyPath:
         structure = self.states.structure
         steps = metric_length(structure, np.diff(self.states.z[:, : structure.unknowns], axis=0))
         return np.concatenate([[0.0], np.cumsum(steps)])
+
+    @check_arguments
+    def along(self, count: int) -> States:
+        """Configurations at even distances along the path, interpolated between those known.
+
+        Raises
+        ------
+        InputError
+            If `count` is less than two.
+        """
+        if count < 2:
+            raise InputError(f"`count` must be at least 2; got {count}.")
+        places = np.linspace(0.0, self.length[-1], count)
+        rows = [np.interp(places, self.length, column) for column in self.states.z.T]
+        p = np.tile(self.states.p[:1], (count, 1))
+        return States(self.states.structure, np.stack(rows, axis=1), p)

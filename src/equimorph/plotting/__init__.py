@@ -20,7 +20,7 @@ from equimorph.plotting.snaps import snap_panels
 from equimorph.plotting.strongest import beside_strongest, strongest_settings
 from equimorph.plotting.style import house_style, save
 from equimorph.plotting.surface import surface
-from equimorph.plotting.transitions import disconnectivity, energy_path
+from equimorph.plotting.transitions import disconnectivity, energy_path, least_barriers
 
 __all__ = [
     "alternative_routes",
@@ -37,6 +37,7 @@ __all__ = [
     "house_style",
     "imperfection_laws",
     "landscape",
+    "least_barriers",
     "level_plane",
     "load_map",
     "margins",

@@ -17,9 +17,9 @@ from equimorph.argument_checks import check_arguments
 from equimorph.array_types import Float
 from equimorph.arrays import Values
 from equimorph.charts.regions import count_equilibria
-from equimorph.equilibria import Path
+from equimorph.equilibria import EnergyPath, Path
 from equimorph.manifold import EquilibriumSet
-from equimorph.model import position
+from equimorph.model import Constraint, position
 from equimorph.plotting import style
 from equimorph.plotting.counts import hatch_cut, shade_regions
 from equimorph.plotting.curves import path_of, states_along, track
@@ -27,6 +27,7 @@ from equimorph.plotting.labels import descriptor_label, parameter_label, symbol
 from equimorph.plotting.moving import film_file, write_film
 from equimorph.plotting.plane import draw_folds, draw_track, frame_plane
 from equimorph.plotting.surroundings import Moving, Surroundings, frame_shapes, obstacles_of
+from equimorph.plotting.transitions import energy_path
 from equimorph.plotting.viewpoint import draw_triad
 from equimorph.structures import States
 from equimorph.tasks.route import Route
@@ -47,7 +48,7 @@ _LONGEST_UNIT = 4
 
 @check_arguments
 def film(
-    route: Route | Path,
+    route: Route | Path | EnergyPath,
     path: str | FilePath,
     eset: EquilibriumSet | None = None,
     *,
@@ -57,12 +58,13 @@ def film(
     """Write a film: the structure on the left, its point in the parameter plane on the right.
 
     Every frame shows an equilibrium of the route, at even distances along it. Without a set the
-    point moves over the parameter that changes most, at the height of the structure's elevation.
+    point moves over the parameter that changes most, at the height of the structure's elevation. On
+    a minimum-energy path it moves over the length of the path, at the energy.
 
     Parameters
     ----------
     route
-        A route with a path, or a lifted path.
+        A route with a path, a lifted path, or a minimum-energy path.
     path
         File to write, a GIF, or an MP4 if the program ffmpeg is there; its folder must exist.
     eset
@@ -83,13 +85,25 @@ def film(
         that its name says.
     """
     file = film_file(path)
-    states = states_along(path_of(route), frames)
-    board = _Board(route, eset)
+    board: _Board | _Landscape
+    if isinstance(route, EnergyPath):
+        board, states = _Landscape(route), route.along(frames)
+    else:
+        board, states = _Board(route, eset), states_along(path_of(route), frames)
     with style.house_style(_LARGER):
         stage = _set_stage(states, board)
         pictures = _pictures(stage, states, board)
     write_film(pictures, file, fps)
     return file
+
+
+class _Reading(NamedTuple):
+    """A number under the pictures."""
+
+    label: str
+    unit: str
+    form: str
+    values: Values
 
 
 @dataclass(frozen=True)
@@ -139,6 +153,44 @@ class _Board:
         assert isinstance(self.route, Route), "a plane of parameters shows a route"
         draw_track(ax, self.eset, self.route, self.path).set_linewidth(0.8)
 
+    @property
+    def constraints(self) -> tuple[Constraint, ...]:
+        """Those of the set."""
+        return () if self.eset is None else self.eset.constraints
+
+    def readings(self, states: States) -> list[_Reading]:
+        """Free parameters, stability margin, and curvature if the schedule has it."""
+        parameters = states.structure.parameters
+        free = [parameters[position(parameters, name)] for name in self.names]
+        readings = [_Reading(symbol(p.name), p.unit, "{:.2f}", states[p.name]) for p in free]
+        readings.append(_Reading("stability margin", "", "{:.2f}", states.margin))
+        schedule = self.route.schedule if isinstance(self.route, Route) else None
+        if schedule is not None and _CURVATURE in schedule.descriptors:
+            kappa = states.structure.descriptor(_CURVATURE)
+            readings.append(_Reading(kappa.symbol, kappa.unit, "{:.1f}", kappa(states)))
+        return readings
+
+
+@dataclass(frozen=True)
+class _Landscape:
+    """The energy along a minimum-energy path, over its length."""
+
+    path: EnergyPath
+    constraints: tuple[Constraint, ...] = ()
+
+    def places(self, states: States) -> Float[np.ndarray, "states 2"]:
+        """Where configurations along the path are in the diagram."""
+        return np.column_stack([replace(self.path, states=states).length, states.energy])
+
+    def draw(self, ax: Axes) -> None:
+        """Draw the diagram."""
+        energy_path(self.path, ax, shapes=False)
+
+    def readings(self, states: States) -> list[_Reading]:
+        """The energy above that of the start."""
+        unit = states.structure.descriptor("energy").unit
+        return [_Reading("$\\Delta E$", unit, "{:.4f}", states.energy - states.energy[0])]
+
 
 @dataclass(frozen=True)
 class _Stage:
@@ -167,14 +219,13 @@ class _Stage:
         return (*in_depth, self.travelled, self.point, *self.texts)
 
 
-def _set_stage(states: States, board: _Board) -> _Stage:
+def _set_stage(states: States, board: _Board | _Landscape) -> _Stage:
     """Draw what stays and prepare what moves."""
     figure = Figure(figsize=(_WIDTH, _HEIGHT), dpi=_DOTS)
     canvas: Any = FigureCanvasAgg(figure)
     left = figure.add_axes((0.01, 0.15, 0.54, 0.84))
     right = figure.add_axes((0.64, 0.17, 0.335, 0.79))
-    constraints = () if board.eset is None else board.eset.constraints
-    around = Surroundings(states, obstacles_of(constraints))
+    around = Surroundings(states, obstacles_of(board.constraints))
     frame_shapes(left, around, room=0.1)
     left.axis("off")
     around.draw_grounds(left)
@@ -186,7 +237,7 @@ def _set_stage(states: States, board: _Board) -> _Stage:
     (travelled,) = right.plot([], [], color=style.ROUTE_COLOUR, linewidth=2.4, zorder=8)
     (point,) = right.plot([], [], "o", color=style.INK, markeredgecolor="white", ms=7, zorder=9)
     parts = around.moving_parts(left)
-    texts, numbers = _place_readings(figure, _readings(states, board))
+    texts, numbers = _place_readings(figure, board.readings(states))
     # Animated artists are left out of the background.
     stage = _Stage(canvas, None, shape, parts, travelled, point, texts, numbers)
     for artist in stage._moving():
@@ -195,7 +246,7 @@ def _set_stage(states: States, board: _Board) -> _Stage:
     return replace(stage, background=canvas.copy_from_bbox(figure.bbox))
 
 
-def _pictures(stage: _Stage, states: States, board: _Board) -> list[Image.Image]:
+def _pictures(stage: _Stage, states: States, board: _Board | _Landscape) -> list[Image.Image]:
     """One picture per state."""
     places = board.places(states)
     ways = _ways(board, places)
@@ -212,7 +263,9 @@ def _pictures(stage: _Stage, states: States, board: _Board) -> list[Image.Image]
     return pictures
 
 
-def _ways(board: _Board, places: Float[np.ndarray, "frames 2"]) -> list[Float[np.ndarray, "_ 2"]]:
+def _ways(
+    board: _Board | _Landscape, places: Float[np.ndarray, "frames 2"]
+) -> list[Float[np.ndarray, "_ 2"]]:
     """Way to each place through all corners passed before it."""
     path = board.path
     length = np.linspace(path.length[0], path.length[-1], len(places))
@@ -221,28 +274,6 @@ def _ways(board: _Board, places: Float[np.ndarray, "frames 2"]) -> list[Float[np
         np.concatenate([corners[:count], place[None]])
         for count, place in zip(passed, places, strict=True)
     ]
-
-
-class _Reading(NamedTuple):
-    """A number under the pictures."""
-
-    label: str
-    unit: str
-    form: str
-    values: Values
-
-
-def _readings(states: States, board: _Board) -> list[_Reading]:
-    """Free parameters, stability margin, and curvature if the schedule has it."""
-    parameters, route = states.structure.parameters, board.route
-    free = [parameters[position(parameters, name)] for name in board.names]
-    readings = [_Reading(symbol(p.name), p.unit, "{:.2f}", states[p.name]) for p in free]
-    readings.append(_Reading("stability margin", "", "{:.2f}", states.margin))
-    schedule = route.schedule if isinstance(route, Route) else None
-    if schedule is not None and _CURVATURE in schedule.descriptors:
-        kappa = states.structure.descriptor(_CURVATURE)
-        readings.append(_Reading(kappa.symbol, kappa.unit, "{:.1f}", kappa(states)))
-    return readings
 
 
 def _place_readings(

@@ -1,20 +1,25 @@
-"""Figures of transition networks: the disconnectivity graph, and minimum-energy paths."""
+"""Figures of transition networks: disconnectivity graphs, minimum-energy paths, barriers."""
 
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.colors import Normalize
 
 from equimorph.argument_checks import check_arguments
 from equimorph.array_types import Float
 from equimorph.equilibria import EnergyPath, TransitionNetwork
 from equimorph.errors import InputError
+from equimorph.manifold import EquilibriumSet
 from equimorph.plotting import style
 from equimorph.plotting.labels import with_unit
+from equimorph.plotting.maps import value_colours
+from equimorph.plotting.plane import draw_folds, frame_plane
 from equimorph.plotting.surroundings import Surroundings, frame_shapes
 from equimorph.structures import States
 
 _TREE_ROOM, _PATH_ROOM = (0.66, 0.66, 0.1, 0.1), (0.66, 0.98, 0.1, 0.1)
+_PLANE_ROOM = (0.5, 0.42, 0.62, 0.1)
 """Inches around the axes: left, bottom, right, top; shapes stand below."""
 _HEIGHT = 2.7
 _BAND, _BELOW_TREE, _BELOW_PATH = 0.3, -0.33, -0.45
@@ -108,7 +113,7 @@ def _order(network: TransitionNetwork) -> list[int]:
 
 
 @check_arguments
-def energy_path(path: EnergyPath, ax: Axes | None = None) -> Axes:
+def energy_path(path: EnergyPath, ax: Axes | None = None, *, shapes: bool = True) -> Axes:
     """Energy along a minimum-energy path, with the shapes of its stable states and saddles.
 
     Parameters
@@ -117,6 +122,8 @@ def energy_path(path: EnergyPath, ax: Axes | None = None) -> Axes:
         The path.
     ax
         Where to draw; None makes a figure one column wide.
+    shapes
+        Whether shapes stand below.
 
     Returns
     -------
@@ -133,14 +140,61 @@ def energy_path(path: EnergyPath, ax: Axes | None = None) -> Axes:
             marks.append(at)
         ax.margins(y=_HEADROOM)
         ax.set_ylabel(_energy_label(path.states))
-        ax.set_xlabel("length of the path in the metric", labelpad=_LABEL_PAD)
+        ax.set_xlabel("length of the path in the metric", labelpad=_LABEL_PAD if shapes else None)
         order = np.argsort(np.concatenate(marks))
         z = np.concatenate([minima.z, saddles.z])[order]
         p = np.concatenate([minima.p, saddles.p])[order]
         shown, at = States(path.states.structure, z, p), np.concatenate(marks)[order]
         step = float(np.diff(at).min(initial=np.inf)) if len(at) > 1 else 1.0
         ax.set_xlim(at[0] - 0.5 * step, at[-1] + 0.5 * step)
-        _draw_shapes(ax, shown, at, _BELOW_PATH)
+        if shapes:
+            _draw_shapes(ax, shown, at, _BELOW_PATH)
+    return ax
+
+
+@check_arguments
+def least_barriers(
+    eset: EquilibriumSet, values: Float[np.ndarray, "rows columns"], ax: Axes | None = None
+) -> Axes:
+    """Least energy barrier among the stable states over each point of two parameters.
+
+    What stays white has nothing to snap to, or no stable state.
+
+    Parameters
+    ----------
+    eset
+        Equilibrium set over two free parameters.
+    values
+        Barriers on a grid over its box, as `SetBarriers.least`; negative ones for infinite ones.
+    ax
+        Where to draw; None makes a figure one column wide.
+
+    Returns
+    -------
+    The axes.
+
+    Raises
+    ------
+    InputError
+        If the set has another number of free parameters.
+    """
+    if len(eset.names) != 2:
+        raise InputError(f"`eset` must have two free parameters; got {', '.join(eset.names)}.")
+    axes = [
+        np.linspace(low, high, count)
+        for low, high, count in zip(eset.box.lower, eset.box.upper, values.T.shape, strict=True)
+    ]
+    with style.house_style():
+        own = ax is None
+        ax = ax or style.new_axes(style.SINGLE_COLUMN, _HEIGHT, _PLANE_ROOM)
+        shown = np.ma.masked_less(values, 0.0)
+        look: dict[str, Any] = {"cmap": value_colours(), "norm": Normalize(0.0)}
+        paint = ax.pcolormesh(*axes, shown, shading="nearest", rasterized=True, **look)
+        frame_plane(ax, eset)
+        lines = draw_folds(ax, eset, stable_only=True)
+        unit = eset.structure.descriptor("energy").unit
+        style.colour_bar(ax, paint, with_unit("least barrier $\\Delta E$", unit))
+        style.legend_below(ax, lines, room=own)
     return ax
 
 

@@ -15,8 +15,17 @@ from types import ModuleType
 from typing import Any
 
 from equimorph import tasks
-from equimorph.dynamics import Replay
-from equimorph.equilibria import Event, Landing, LimitLoad, Path
+from equimorph.dynamics import LeastShock, Replay, Shock
+from equimorph.equilibria import (
+    Completeness,
+    EnergyBarrier,
+    Event,
+    Landing,
+    LimitLoad,
+    Path,
+    TransitionNetwork,
+)
+from equimorph.equilibria.minima_graph import Argument
 from equimorph.errors import InputError
 from equimorph.manifold import Audit, Component, Snap, StabilityDistance, Stratum
 from equimorph.model import Schedule
@@ -27,6 +36,7 @@ from equimorph.tasks.reach.regions import Region
 OTHERS = (
     *(Audit, Component, Stratum, Snap, StabilityDistance),
     *(Event, Landing, LimitLoad, Path, Replay, Schedule, Answer, Region),
+    *(TransitionNetwork, Completeness, Argument, EnergyBarrier, LeastShock, Shock),
 )
 """Records of the layers below the tasks, and those whose names other dataclasses have, too."""
 

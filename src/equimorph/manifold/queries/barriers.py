@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
-from equimorph.array_types import Bool, Int
+from equimorph.array_types import Bool, Float, Int
 from equimorph.arrays import Flags, ItemValues, Lanes, Numbers, Parameters, Some, Values
 from equimorph.equilibria import EnergyBarrier
 from equimorph.equilibria.snap import CRITICAL
@@ -155,6 +155,35 @@ class SetBarriers:
         z, p = eset.points.z[stable], eset.points.p[stable]
         values[stable] = self._of(z, p, exact=False).energy
         return values
+
+    @check_arguments
+    def least(self, count: int = 80) -> Float[np.ndarray, "rows columns"]:
+        """Least barrier among the stable states at each point of a grid over two parameters.
+
+        Rows go along the second parameter. Infinite without one: with nothing to snap to, or no
+        stable state.
+
+        Raises
+        ------
+        InputError
+            If the set has another number of free parameters, or `count` is less than two.
+        """
+        box = self.eset.box
+        if len(box.names) != 2 or count < 2:
+            raise InputError(
+                "`count` must be at least 2, for a set over two parameters; got "
+                f"{count} over {', '.join(box.names)}."
+            )
+        axes = [
+            np.linspace(low, high, count) for low, high in zip(box.lower, box.upper, strict=True)
+        ]
+        places = [each.ravel() for each in np.meshgrid(*axes)]
+        over = self.eset.over(**dict(zip(box.names, places, strict=True)))
+        stable = np.flatnonzero(over.index == 0)
+        values = np.full(count * count, np.inf)
+        found = self._of(over.states.z[stable], over.states.p[stable], exact=False).energy
+        np.fmin.at(values, over.point[stable], found)
+        return values.reshape(count, count)
 
     @cached_property
     def _numbers(self) -> dict[bytes, int]:

@@ -19,7 +19,8 @@ ORDER = (
         "room",
         "snap",
     ),
-    *("snap_graph", "trials", "estimate", "calibration", "map", "strongest", "chart", "reduction"),
+    *("snap_graph", "transition_network", "barriers", "least_shock"),
+    *("trials", "estimate", "calibration", "map", "strongest", "chart", "reduction"),
 )
 """Order in which kinds are answered and reported; further kinds follow by their names."""
 
