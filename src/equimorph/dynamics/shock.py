@@ -163,9 +163,10 @@ def least_shock(
     --------
     >>> import equimorph as em
     >>> spring = em.Spring()
-    >>> shock = em.least_shock(spring.natural_state(x_l=0.8), at=spring.height)
-    >>> round(shock["point force"].value, 6)  # (1 − 0.8^⅔)^(3/2), downwards
-    -0.051391
+    >>> coarse = em.ReplaySettings(step=0.1)
+    >>> shock = em.least_shock(spring.natural_state(x_l=0.8), settings=coarse)
+    >>> round(shock["impulse over the saddle"].bound, 6)  # ½ (1 − 0.8)²
+    0.02
     """
     check_start(state)
     used = settings or ReplaySettings()

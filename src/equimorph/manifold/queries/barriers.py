@@ -157,7 +157,7 @@ class SetBarriers:
         return values
 
     @check_arguments
-    def least(self, count: int = 80) -> Float[np.ndarray, "rows columns"]:
+    def least(self, count: int = 81) -> Float[np.ndarray, "rows columns"]:
         """Least barrier among the stable states at each point of a grid over two parameters.
 
         Rows go along the second parameter. Infinite without one: with nothing to snap to, or no

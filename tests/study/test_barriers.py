@@ -1,0 +1,68 @@
+"""Questions of a study on energy: barriers of the spring are known at F = 0, ½ (1 − x_l)²."""
+
+import numpy as np
+import pytest
+
+from studies import SPRING_SET, answered, answered_again, page, rows_of
+
+QUESTIONS = """\
+[[transition_network]]
+name = "here"
+at = { x_l = 0.8, F = 0.0 }
+
+[[transition_network]]
+name = "alone"
+at = { x_l = 1.2, F = 0.0 }
+
+[[barriers]]
+name = "all"
+
+[[least_shock]]
+name = "knock"
+state = { at = { x_l = 0.8, F = 0.0 }, highest = "angle" }
+step = 0.2
+"""
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    return answered(tmp_path_factory.mktemp("energy"), SPRING_SET + QUESTIONS)
+
+
+def test_the_page_tells_barriers_and_where_they_lead(run):
+    outcome, out = run
+    network = outcome.of("transition_network")["here"]
+    heights = [network.barrier(each).energy for each in network.states[network.minima]]
+    assert heights == pytest.approx([0.02, 0.02], abs=1e-9)
+    told = page(out)
+    assert "<strong>2 stable states</strong>, 1 saddle; the least barrier is 0.02." in told
+    assert "<strong>1 stable state</strong>, 0 saddles; nothing to snap to." in told
+    assert outcome.of("least_shock")["knock"].barrier.energy == pytest.approx(0.02, abs=1e-9)
+    for end in ("tree.png", "path.png", "film.gif"):
+        assert (out / f"here-transition_network-{end}").exists()
+
+
+def test_barriers_over_the_set_are_those_of_settings(run):
+    """At F = 0, x_l = 0.5 it is ⅛; white where there is nothing to snap to, at x_l > 1."""
+    outcome, out = run
+    least, state, most = outcome.of("barriers")["all"]
+    assert least.shape == (81, 81)
+    assert least[40, 0] == pytest.approx(0.125, abs=1e-9)
+    assert (least[:, -30:] < 0.0).all()
+    assert most.status == "landed"
+    assert most.energy > least.max()
+    head, row = rows_of(out / "all-barriers.csv")
+    assert float(row[head.index(next(x for x in head if x.startswith("barrier")))]) == most.energy
+    assert state.stable
+
+
+def test_answers_are_read_from_their_folder(run):
+    outcome, out = run
+    again = answered_again(out.parent / "spring.toml", out)
+    for table in ("transition_network", "barriers", "least_shock"):
+        assert again.of(table).keys() == outcome.of(table).keys()
+    before, after = (each.of("transition_network")["here"] for each in (outcome, again))
+    np.testing.assert_array_equal(before.states.z, after.states.z)
+    np.testing.assert_array_equal(before.ends, after.ends)
+    shocks = [each.of("least_shock")["knock"].shocks[0].value for each in (outcome, again)]
+    assert shocks[0] == shocks[1]
