@@ -7,13 +7,13 @@ import numpy as np
 from scipy.stats import chi2
 
 from equimorph.argument_checks import check_arguments
-from equimorph.arrays import Flags
+from equimorph.arrays import Flags, Values
 from equimorph.control.belief import Belief, ControlStatus
 from equimorph.control.estimate import Estimate, Measurement, fitted
 from equimorph.control.likely import Bundles, LikelyLoads, moved, positions
 from equimorph.control.moving_target import MovingTarget
 from equimorph.control.safe_routes import route_is_safe, safe_route
-from equimorph.control.strides import Strides, setting_of
+from equimorph.control.strides import Step, Strides
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Constraint, Descriptor
@@ -203,20 +203,18 @@ class Controller:
         belief = self._estimated(belief, Measurement.of(measured, self.errors))
         if belief.status == ControlStatus.NOT_EXPLAINED:
             return belief
-        likely = self._likely(belief)
-        place = likely.under(belief.state.batch)
+        belief, likely = self._passed(belief), self._likely(belief)
+        place, ahead = self._strides.begin(belief.state, self._next_place(belief), likely)
         if not place.safe[0]:
             return self._retreat(belief, likely)
         if self._target is not None:
-            return self._tracked(belief, likely, place)
+            return self._tracked(belief, likely, place, ahead)
         if self._is_stale(belief):
             if self._follows_safely(belief, likely, place):
                 belief = replace(belief, checked=belief.state.p[self._loads])
             else:
-                belief = self._replanned(belief, likely, place)
-        if belief.status == ControlStatus.NO_SAFE_WAY:
-            return belief
-        return self._strode(belief, likely, place)
+                return self._replanned(belief, likely, place)
+        return self._strode(belief, likely, place, ahead)
 
     @check_arguments
     def run(
@@ -330,43 +328,59 @@ class Controller:
             why="",
         )
 
-    def _strode(self, belief: Belief, likely: LikelyLoads, place: Bundles) -> Belief:
-        """Belief after the longest safe stride towards the next way-point."""
-        names, here = self.eset.names, belief.state.p[self._actuators]
-        ahead = list(belief.way_points)
-        while ahead and np.allclose(
-            setting_of(ahead[0], names, here), here, rtol=0, atol=SAME_TO_ROUNDING
-        ):
+    def _passed(self, belief: Belief) -> Belief:
+        """Belief without the way-points that it has reached."""
+        here, ahead = belief.state.p[self._actuators], list(belief.way_points)
+        while ahead and np.allclose(self._setting(ahead[0], here), here, 0, SAME_TO_ROUNDING):
             ahead.pop(0)
-        if not ahead and self._is_goal(belief.state.batch)[0]:
-            return replace(belief, way_points=(), status=ControlStatus.ARRIVED)
-        if not ahead:
+        return replace(belief, way_points=tuple(ahead))
+
+    def _setting(self, point: Command, here: Values) -> Values:
+        """A way-point as an array; actuators that it does not name stay."""
+        named = zip(self.eset.names, here, strict=True)
+        return np.array([point.get(name, value) for name, value in named])
+
+    def _next_place(self, belief: Belief) -> Values | None:
+        """Actuators to go to: the next way-point, or what meets the moving target; None if none."""
+        if self._target is None:
+            here, ahead = belief.state.p[self._actuators], belief.way_points
+            return self._setting(ahead[0], here) if ahead else None
+        there = self._target.place(belief.state, self._leg(belief))
+        return there if there is not None and self.eset.box.holds(there, slack=0.0) else None
+
+    def _leg(self, belief: Belief) -> float:
+        """Where the moving target is next."""
+        assert self._target is not None
+        return min(belief.at + self.pace, self._target.duration)
+
+    def _strode(self, belief: Belief, likely: LikelyLoads, place: Bundles, ahead: Step) -> Belief:
+        """Belief after the longest safe stride towards the next way-point."""
+        if ahead.there is None and self._is_goal(belief.state.batch)[0]:
+            return replace(belief, status=ControlStatus.ARRIVED)
+        if ahead.there is None:
             return self._replanned(belief, likely, place)
-        there = setting_of(ahead[0], names, here)
-        stride = self._strides.towards(belief.state, likely, place, there)
+        stride = self._strides.towards(place, ahead, likely)
         if stride.state is not None:
-            return replace(belief, state=stride.state, way_points=tuple(ahead))
+            return replace(belief, state=stride.state)
         changed = self._replanned(belief, likely, place)
         if changed.status == ControlStatus.REPLANNED:
             return changed
-        return replace(changed, why=f"no stride towards {_words(ahead[0])} is safe; {changed.why}")
+        words = _words(belief.way_points[0])
+        return replace(changed, why=f"no stride towards {words} is safe; {changed.why}")
 
-    def _tracked(self, belief: Belief, likely: LikelyLoads, place: Bundles) -> Belief:
+    def _tracked(self, belief: Belief, likely: LikelyLoads, place: Bundles, ahead: Step) -> Belief:
         """Belief after the longest safe stride towards the next values of the moving target."""
-        target = self._target
-        assert target is not None
-        at = min(belief.at + self.pace, target.duration)
-        there = target.place(belief.state, at)
-        if there is None or not self.eset.box.holds(there, slack=0.0):
+        at, refused = self._leg(belief), replace(belief, status=ControlStatus.NO_SAFE_WAY)
+        if ahead.there is None:
             why = f"no setting of the actuators in the box meets the target at leg {at:.6g}"
-            return replace(belief, status=ControlStatus.NO_SAFE_WAY, why=why)
-        stride = self._strides.towards(belief.state, likely, place, there)
+            return replace(refused, why=why)
+        stride = self._strides.towards(place, ahead, likely)
         if stride.state is None:
-            why = f"no stride towards the target at leg {at:.6g} is safe"
-            return replace(belief, status=ControlStatus.NO_SAFE_WAY, why=why)
+            return replace(refused, why=f"no stride towards the target at leg {at:.6g} is safe")
         if not stride.whole:
             return replace(belief, state=stride.state)
-        ended = belief.at == target.duration
+        assert self._target is not None
+        ended = belief.at == self._target.duration
         status = ControlStatus.ARRIVED if ended else ControlStatus.FOLLOWING
         return replace(belief, state=stride.state, at=at, status=status)
 

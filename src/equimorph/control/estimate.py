@@ -5,7 +5,7 @@ equilibrium set itself: the commanded actuators are known, unknown loads wander,
 the equilibrium over both on the sheet on which the structure was.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,13 +18,14 @@ from equimorph.equilibria import Guards, settle
 from equimorph.errors import InputError
 from equimorph.model import Descriptor
 from equimorph.structures import State, States
+from equimorph.tasks.motion.course import Linearisation, linearise
 
-ROUNDS = 5
+ROUNDS = 10
 """Most Gauss–Newton steps of an estimate; two are common."""
+SHARES = 0.5 ** np.arange(6)
+"""Parts of a step that are tried where the whole one leads off the sheet or to a worse fit."""
 SETTLED = 1e-3
 """Step, in standard errors, after which an estimate is taken."""
-DIFFERENCE = 1e-4
-"""Change of a load, in its scale, over which descriptors are differenced."""
 CLOSE = 0.05
 """Distance from the tangent, in the metric, within which a corrected state is on its sheet."""
 
@@ -92,52 +93,45 @@ class Estimate:
 def fitted(prior: State, at: Places, covariance: Covariance, measured: Measurement) -> Estimate:
     """Estimate from a measurement and normally distributed loads about those of `prior`.
 
-    Gauss–Newton; the state follows the loads on its sheet. Where that ends at a fold or a branch
-    point the search ends, too, with the misfit of that place.
+    Gauss–Newton whose steps are shortened until they lead to a better stable state on the sheet: a
+    fold or a branch point before the whole step does not end the search. Where the best fit lies
+    at such a place, the search comes as close to it as `ROUNDS` halvings do.
     """
-    structure, k = prior.structure, len(at)
-    whiten = np.linalg.inv(np.linalg.cholesky(covariance))
-    step = DIFFERENCE * structure.scales[at]
+    structure, scales = prior.structure, prior.structure.scales[at]
+    whiten = np.linalg.inv(np.linalg.cholesky(covariance)) * scales
+
+    def residuals(states: States) -> Float[np.ndarray, "lanes values"]:
+        drawn = (states.p[:, at] - prior.p[at]) / scales @ whiten.T
+        return np.concatenate([measured.residuals(states), drawn], axis=1)
+
     here = prior.batch
-    slopes = np.zeros((len(measured.values), k))
     for _ in range(ROUNDS):
-        around = _differences(here, at, step)
-        values = measured.residuals(around)
-        slopes = ((values[1 : k + 1] - values[k + 1 :]) / (2.0 * step[:, None])).T
-        drawn = whiten @ (here.p[0, at] - prior.p[at])
-        whole = np.concatenate([slopes, whiten])
-        change = np.linalg.lstsq(whole, -np.concatenate([values[0], drawn]), rcond=None)[0]
-        if np.linalg.norm(whole @ change) < SETTLED:
+        along = linearise(structure, here.z, here.p, at, measured.descriptors)
+        slopes = np.concatenate([along.slope[0] / measured.errors[:, None], whiten])
+        change = np.linalg.lstsq(slopes, -residuals(here)[0], rcond=None)[0]
+        if np.linalg.norm(slopes @ change) < SETTLED:
             break
-        here, arrived = _followed(around, change / step, at)
-        if not arrived:
+        misfit = (residuals(here) ** 2).sum()
+        for ahead in _after(here, at, along, change):
+            misfits = (residuals(ahead) ** 2).sum(axis=1)
+            if misfits.min(initial=np.inf) < misfit:
+                here = ahead[np.argmin(misfits)].batch
+                break
+        else:
             break
-    drawn = whiten @ (here.p[0, at] - prior.p[at])
-    misfit = float((measured.residuals(here)[0] ** 2).sum() + (drawn**2).sum())
-    posterior = np.linalg.inv(slopes.T @ slopes + whiten.T @ whiten)
-    return Estimate(here[0], posterior, misfit)
+    posterior = np.linalg.inv(slopes.T @ slopes) * np.outer(scales, scales)
+    return Estimate(here[0], posterior, float((residuals(here) ** 2).sum()))
 
 
-def _differences(here: States, at: Places, step: Loads) -> States:
-    """The state, then those with each load a little larger, then those a little smaller."""
-    k = len(at)
-    z, p = here.z.repeat(2 * k + 1, 0), here.p.repeat(2 * k + 1, 0)
-    p[1 : k + 1, at] += np.diag(step)
-    p[k + 1 :, at] -= np.diag(step)
-    return States(here.structure, settle(here.structure, z, p).z, p)
+def _after(here: States, at: Places, along: Linearisation, change: Loads) -> Iterator[States]:
+    """The state after a change of the loads, if any; then those after parts of it.
 
-
-def _followed(around: States, steps: Loads, at: Places) -> tuple[States, bool]:
-    """The first of some states after so many steps of each load, as `_differences` made them.
-
-    One Newton correction from the tangent, where it stays close to it; otherwise a lift.
+    The first is corrected from the tangent and near it, the others are lifted.
     """
-    k, structure = len(steps), around.structure
-    along_z, along_p = (0.5 * (x[1 : k + 1] - x[k + 1 :]) for x in (around.z, around.p))
-    z, p = around.z[:1] + steps @ along_z, around.p[:1] + steps @ along_p
+    z, p = here.z + change @ along.dz[0], here.p + change @ along.dp[0]
     stable, near = np.zeros(1, int), np.full(1, CLOSE)
-    settled = settle(structure, z, p, guards=Guards(index=stable, trust=near))
-    if settled.found[0]:
-        return States(structure, settled.z, settled.p), True
-    states, arrived = moved(around[:1], at, p[:, at])
-    return states, bool(arrived[0])
+    settled = settle(here.structure, z, p, guards=Guards(index=stable, trust=near))
+    yield States(here.structure, settled.z, settled.p)[np.flatnonzero(settled.found)]
+    loads = (here.p + SHARES[:, None] * (p - here.p))[:, at]
+    states, arrived = moved(here[np.zeros(len(SHARES), int)], at, loads)
+    yield states[np.flatnonzero(arrived)]

@@ -108,26 +108,12 @@ class LikelyLoads:
         return self._bundles(source, to)
 
     def linked(self, source: Bundles, target: Bundles) -> Flags:
-        """Whether straight moves lead from places to places safely under each of the loads."""
-        return self._agree(source, self._bundles(source.states, target.states.p), target)
-
-    def onward(self, source: Bundles, at: Places, to: Float[np.ndarray, "n d"]) -> Bundles:
-        """Places after straight moves of the actuators; safe where the moves are, too."""
-        p = source.states.p.copy()
-        p[:, at] = to.repeat(source.loads, 0)
-        after = self._bundles(source.states, p)
-        if not after.safe.any():
-            return after
-        target = self.under(after.estimated)
-        return replace(target, safe=self._agree(source, after, target))
-
-    def _agree(self, source: Bundles, after: Bundles, target: Bundles) -> Flags:
-        """Whether moves to `after` are safe and lead to the same states as the loads at the target.
+        """Whether straight moves lead from places to places safely under each of the loads.
 
         After a jump the structure may come elsewhere, as long as it does not snap; it may happen
         anywhere on the way.
         """
-        structure = after.states.structure
+        after, structure = self._bundles(source.states, target.states.p), target.states.structure
         gaps = (after.states.z - target.states.z)[:, : structure.unknowns]
         apart = metric_length(structure, gaps).reshape(-1, source.loads)[:, : self.usual]
         good = after.safe & source.safe & target.safe & (apart < MATCH).all(axis=1)

@@ -1,6 +1,5 @@
 """Strides of the actuators, none beyond what is safe under all likely loads."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -8,7 +7,7 @@ import numpy as np
 from equimorph.arrays import Values
 from equimorph.control.likely import Bundles, LikelyLoads, Places, moved
 from equimorph.model import Box
-from equimorph.structures import State
+from equimorph.structures import State, States, join_states
 
 SHARES = (1.0, 0.5, 0.25)
 """Parts of a stride that are tried, the longest first."""
@@ -20,6 +19,14 @@ class Stride:
 
     state: State | None
     whole: bool = False
+
+
+@dataclass(frozen=True)
+class Step:
+    """Actuators to go to, None at the end of the way; the place after the whole stride, if any."""
+
+    there: Values | None
+    after: Bundles
 
 
 @dataclass(frozen=True)
@@ -40,18 +47,37 @@ class Strides:
     actuators: Places
     longest: float
 
-    def towards(self, state: State, likely: LikelyLoads, place: Bundles, there: Values) -> Stride:
-        """The longest safe stride towards a place."""
-        here, scales = state.p[self.actuators], state.structure.scales[self.actuators]
-        length = float(np.linalg.norm((there - here) / scales))
-        part = 1.0 if length <= self.longest else self.longest / length
+    def begin(
+        self, state: State, there: Values | None, likely: LikelyLoads
+    ) -> tuple[Bundles, Step]:
+        """A place, and the first step from it towards another, each under all likely loads."""
+        after = state.batch[:0] if there is None else self._after(state, there, 1.0)
+        places = likely.under(join_states(state.structure, [state.batch, after]))
+        here, ahead = np.split(np.arange(len(places)), [1])
+        return places.take(here), Step(there, places.take(ahead))
+
+    def towards(self, place: Bundles, first: Step, likely: LikelyLoads) -> Stride:
+        """The longest safe stride towards the place of a step."""
+        state, there = place.estimated[0], first.there
+        assert there is not None
         for share in SHARES:
-            whole = share * part == 1.0
-            target = there if whole else here + share * part * (there - here)
-            after = likely.onward(place, self.actuators, target[None])
-            if after.safe[0]:
-                return Stride(after.estimated[0], whole)
+            whole = share == 1.0
+            ahead = first.after if whole else likely.under(self._after(state, there, share))
+            if len(ahead) and likely.linked(place, ahead)[0]:
+                return Stride(ahead.estimated[0], share * self._part(state, there) == 1.0)
         return Stride(None)
+
+    def _after(self, state: State, there: Values, share: float) -> States:
+        """The state after a part of a stride towards a place, where it is stable; or none."""
+        here, part = state.p[self.actuators], share * self._part(state, there)
+        target = there if part == 1.0 else here + part * (there - here)
+        states, arrived = moved(state.batch, self.actuators, target[None])
+        return states[np.flatnonzero(arrived)]
+
+    def _part(self, state: State, there: Values) -> float:
+        """Part of the way to a place that a stride goes."""
+        way = (there - state.p[self.actuators]) / state.structure.scales[self.actuators]
+        return float(min(1.0, self.longest / max(np.linalg.norm(way), self.longest)))
 
     def away(self, state: State, likely: LikelyLoads) -> State | None:
         """State after the stride along one actuator to the place that bears the loads best."""
@@ -65,8 +91,3 @@ class Strides:
         if not borne.safe.any():
             return None
         return borne.estimated[int(np.argmax(np.where(borne.safe, borne.margins, -np.inf)))]
-
-
-def setting_of(point: Mapping[str, float], names: tuple[str, ...], here: Values) -> Values:
-    """A way-point as an array; actuators that it does not name stay."""
-    return np.array([point.get(name, value) for name, value in zip(names, here, strict=True)])
