@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 
 import equimorph as em
+from equimorph.control.estimate import Measurement, fitted
+from equimorph.control.likely import positions
 from oracles.wandering_load import Plant, PlantInMuJoCo, wandering
 from sets import arch_set
 from typecheck import unchecked
@@ -33,15 +35,14 @@ def begun(controller, spring_set):
     return controller.start(min(spring_set.at(x_l=1.1).stable, key=spring_set.structure.angle))
 
 
-def force_at(state: em.State, angle: float) -> float:
-    """Load of the spring at an angle, by its own equilibrium: F is linear in it."""
-    spring = state.structure
-    lane = np.array([[angle]])
+def force_at(state: em.State, angle):
+    """Loads of the spring at angles, by its own equilibrium: F is linear in it."""
+    spring, lanes = state.structure, np.atleast_1d(angle)[:, None]
     low, high = (
-        spring.residual(lane, np.array([[state["x_l"], force, state["k"]]]))[0, 0]
+        spring.residual(lanes, np.tile([state["x_l"], force, state["k"]], (len(lanes), 1)))[:, 0]
         for force in (0.0, 1.0)
     )
-    return float(-low / (high - low))
+    return np.squeeze(-low / (high - low))[()]
 
 
 def test_loads_are_estimated_as_kalman_says(controller, begun):
@@ -58,6 +59,21 @@ def test_loads_are_estimated_as_kalman_says(controller, begun):
     gradient = (found - seen) * slope / NOISE**2 + (belief.state["F"] - 0.1) / prior
     assert abs(gradient) * np.sqrt(expected) < 2e-3
     assert force_at(belief.state, found) == pytest.approx(belief.state["F"], abs=1e-9)
+
+
+def test_estimates_come_as_close_to_a_fold_as_the_best_fit_is(begun):
+    """Against all angles of the sheet, which ends at cos³ θ = x_l; some were measured beyond it."""
+    spring, start = begun.state.structure, em.lift(begun.state, {"x_l": 0.7}).end.state
+    angle, deviation, end = spring.angle, 0.2, -np.arccos(np.cbrt(0.7))
+    places = np.linspace(-1.3, end, 20001)
+    forces = force_at(start, places)
+    prior, at = ((forces - start["F"]) / deviation) ** 2, positions(spring, ["F"])
+    for seen in (-1.1, end - 0.01, end + 0.01, end + 0.03):
+        measured = Measurement.of({angle: seen}, {angle: NOISE})
+        best = (((places - seen) / NOISE) ** 2 + prior).min()
+        found = fitted(start, at, np.array([[deviation**2]]), measured)
+        assert found.state.index == 0
+        assert found.misfit == pytest.approx(best, rel=1e-2, abs=0.05)
 
 
 def test_without_measurements_the_variance_grows(controller, begun):

@@ -20,9 +20,9 @@ from equimorph.model import Descriptor
 from equimorph.structures import State, States
 from equimorph.tasks.motion.course import Linearisation, linearise
 
-ROUNDS = 10
+ROUNDS = 20
 """Most Gauss–Newton steps of an estimate; two are common."""
-SHARES = 0.5 ** np.arange(6)
+SHARES = 0.25 ** np.arange(6)
 """Parts of a step that are tried where the whole one leads off the sheet or to a worse fit."""
 SETTLED = 1e-3
 """Step, in standard errors, after which an estimate is taken."""
@@ -95,7 +95,7 @@ def fitted(prior: State, at: Places, covariance: Covariance, measured: Measureme
 
     Gauss–Newton whose steps are shortened until they lead to a better stable state on the sheet: a
     fold or a branch point before the whole step does not end the search. Where the best fit lies
-    at such a place, the search comes as close to it as `ROUNDS` halvings do.
+    at such a place, the search comes closer to it with each step.
     """
     structure, scales = prior.structure, prior.structure.scales[at]
     whiten = np.linalg.inv(np.linalg.cholesky(covariance)) * scales
@@ -105,22 +105,24 @@ def fitted(prior: State, at: Places, covariance: Covariance, measured: Measureme
         return np.concatenate([measured.residuals(states), drawn], axis=1)
 
     here = prior.batch
+    left = residuals(here)[0]
     for _ in range(ROUNDS):
         along = linearise(structure, here.z, here.p, at, measured.descriptors)
         slopes = np.concatenate([along.slope[0] / measured.errors[:, None], whiten])
-        change = np.linalg.lstsq(slopes, -residuals(here)[0], rcond=None)[0]
+        change = np.linalg.lstsq(slopes, -left, rcond=None)[0]
         if np.linalg.norm(slopes @ change) < SETTLED:
             break
-        misfit = (residuals(here) ** 2).sum()
         for ahead in _after(here, at, along, change):
-            misfits = (residuals(ahead) ** 2).sum(axis=1)
-            if misfits.min(initial=np.inf) < misfit:
-                here = ahead[np.argmin(misfits)].batch
+            found = residuals(ahead)
+            misfits = (found**2).sum(axis=1)
+            if misfits.min(initial=np.inf) < left @ left:
+                best = int(np.argmin(misfits))
+                here, left = ahead[best].batch, found[best]
                 break
         else:
             break
     posterior = np.linalg.inv(slopes.T @ slopes) * np.outer(scales, scales)
-    return Estimate(here[0], posterior, float((residuals(here) ** 2).sum()))
+    return Estimate(here[0], posterior, float(left @ left))
 
 
 def _after(here: States, at: Places, along: Linearisation, change: Loads) -> Iterator[States]:

@@ -1,16 +1,17 @@
 """Routes that are safe under all likely loads, over the stable cells of an equilibrium set."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from equimorph.array_types import Int
 from equimorph.arrays import Values
-from equimorph.control.likely import Bundles, LikelyLoads, moved, positions
+from equimorph.control.likely import REACH, Bundles, LikelyLoads, moved, positions
 from equimorph.equilibria import TraceOptions
 from equimorph.manifold import EquilibriumSet, equilibrium_set
 from equimorph.manifold.complex.kept_tables import from_cache
+from equimorph.manifold.geometry.topology import labels
 from equimorph.model import names_of
 from equimorph.structures import States, join_states
 from equimorph.tasks.planning.network import (
@@ -36,12 +37,14 @@ def safe_route(
     """States of a route from one place to another, under the estimated loads; None for none.
 
     The set is moved to the estimated loads, and where that does not lead to the goal it is lifted
-    anew there, on a coarse grid: sheets that other loads do not have can be used, too.
+    anew there, on a coarse grid: sheets that other loads do not have can be used, too. Of vertices
+    next to each other only one counts at first, all of them where that leads nowhere.
     """
-    found = _over(eset, start, goal, likely)
+    ends = start, goal
+    found = _over(eset, ends, likely)
     if found is None and not np.allclose(likely.values[0], _loads_of(eset, likely)):
-        found = _over(_lifted_anew(eset, likely), start, goal, likely)
-    return found
+        found = _over(_lifted_anew(eset, likely), ends, likely)
+    return _over(eset, ends, likely, width=0.0) if found is None else found
 
 
 def route_is_safe(
@@ -91,29 +94,26 @@ def _lifted_anew(eset: EquilibriumSet, likely: LikelyLoads) -> EquilibriumSet:
 
 
 def _over(
-    eset: EquilibriumSet, start: Bundles, goal: Bundles, likely: LikelyLoads
+    eset: EquilibriumSet, ends: tuple[Bundles, Bundles], likely: LikelyLoads, width: float = REACH
 ) -> States | None:
-    """A route over the network of a set, moved to the estimated loads.
+    """A route over the places of a set, moved to the estimated loads.
 
     A link costs its length in the scaled actuators over the least margin of its ends under any of
     the likely loads; links are lifted under all of these only where a path uses them.
     """
-    network = network_of(eset)
-    vertices = np.flatnonzero(network.stable)
+    places = from_cache(eset, ("places", width), lambda: _Places.within(eset, width))
     here, arrived = moved(
-        eset.points[vertices], likely.at, np.tile(likely.values[0], (len(vertices), 1))
+        eset.points[places.vertices], likely.at, likely.values[:1].repeat(len(places.vertices), 0)
     )
     nodes = likely.under(here[np.flatnonzero(arrived)])
-    vertices = vertices[arrived][nodes.safe]
-    nodes = nodes.take(np.flatnonzero(nodes.safe)).follow(start).follow(goal)
-    count = len(nodes)
-    number = np.full(len(eset.points), -1)
-    number[vertices] = np.arange(len(vertices))
-    pairs = number[network.pairs]
+    number = np.full(len(places.vertices) + 1, -1)
+    number[np.flatnonzero(arrived)[nodes.safe]] = np.arange(nodes.safe.sum())
+    nodes = nodes.take(np.flatnonzero(nodes.safe)).follow(ends[0]).follow(ends[1])
+    count, pairs = len(nodes), number[places.pairs]
     pairs = np.concatenate([
         pairs[(pairs >= 0).all(axis=1)],
-        _around(eset, vertices, start, count - 2),
-        _around(eset, vertices, goal, count - 1),
+        _around(eset, number[places.around], ends[0], count - 2),
+        _around(eset, number[places.around], ends[1], count - 1),
         [[count - 2, count - 1]],
     ])  # fmt: skip
     path = _cheapest(nodes, pairs, likely)
@@ -133,14 +133,49 @@ def _straightened(path: Bundles, likely: LikelyLoads) -> States:
     return estimated if chain is None else estimated[chain]
 
 
+@dataclass(frozen=True)
+class _Places:
+    """The network of a set, with one place for vertices that are linked and close to each other.
+
+    Parameters
+    ----------
+    vertices
+        Stable vertices, one for each place.
+    around
+        The place of each vertex, −1 for unstable ones.
+    pairs
+        Places that are linked.
+    """
+
+    vertices: Int[np.ndarray, " places"]
+    around: Int[np.ndarray, " vertices"]
+    pairs: Pairs
+
+    @classmethod
+    def within(cls, eset: EquilibriumSet, width: float) -> "_Places":
+        """Places in boxes of a width in the scaled actuators; of a width of zero: all vertices."""
+        network, at = network_of(eset), positions(eset.structure, eset.names)
+        stable, linked = np.flatnonzero(network.stable), network.pairs
+        linked = linked[network.stable[linked].all(axis=1)]
+        near = linked[:0]
+        if width > 0.0:
+            box = np.floor(eset.points.p[:, at] / eset.structure.scales[at] / width)
+            near = linked[(box[linked[:, 0]] == box[linked[:, 1]]).all(axis=1)]
+        label, around = labels(len(eset.points), near), np.full(len(eset.points), -1)
+        _, first, around[stable] = np.unique(label[stable], return_index=True, return_inverse=True)
+        pairs = np.unique(np.sort(around[linked], axis=1), axis=0)
+        return cls(stable[first], around, pairs[pairs[:, 0] < pairs[:, 1]])
+
+
 def _around(
-    eset: EquilibriumSet, vertices: Int[np.ndarray, " n"], place: Bundles, node: int
+    eset: EquilibriumSet, number: Int[np.ndarray, " vertices"], place: Bundles, node: int
 ) -> Pairs:
-    """Links from a place to the vertices over its grid cell and those around."""
+    """Links from a place to the nodes of the vertices over its grid cell and those around."""
     state, cells = place.estimated[0], eset.mesh.cells
     own = eset.mesh.locate(np.array([state[name] for name in eset.names]))
     around = np.unique(cells[np.isin(cells, cells[own]).any(axis=1)])
-    near = np.flatnonzero(np.isin(eset.grid_vertex[vertices], around))
+    near = np.unique(number[np.isin(eset.grid_vertex, around)])
+    near = near[near >= 0]
     return np.stack([np.full(len(near), node), near], axis=1)
 
 

@@ -77,7 +77,7 @@ class Strides:
     def _part(self, state: State, there: Values) -> float:
         """Part of the way to a place that a stride goes."""
         way = (there - state.p[self.actuators]) / state.structure.scales[self.actuators]
-        return float(min(1.0, self.longest / max(np.linalg.norm(way), self.longest)))
+        return self.longest / max(float(np.linalg.norm(way)), self.longest)
 
     def away(self, state: State, likely: LikelyLoads) -> State | None:
         """State after the stride along one actuator to the place that bears the loads best."""
