@@ -4,7 +4,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
-from scipy.stats import chi2
 
 from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Flags, Values
@@ -13,7 +12,7 @@ from equimorph.control.estimate import Estimate, Measurement, fitted
 from equimorph.control.likely import Bundles, LikelyLoads, moved, positions
 from equimorph.control.moving_target import MovingTarget
 from equimorph.control.safe_routes import route_is_safe, safe_route
-from equimorph.control.strides import Step, Strides
+from equimorph.control.strides import Step, Strides, ahead_of, setting_of
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Constraint, Descriptor
@@ -22,12 +21,10 @@ from equimorph.tasks.motion.tracking import Tracking
 from equimorph.tasks.planning.network import Demands
 from equimorph.tasks.route import Route
 from equimorph.tasks.start import check_equilibrium, check_fixed_parameters, check_stable
-from equimorph.tolerances import SAME_STATE, SAME_TO_ROUNDING
+from equimorph.tolerances import SAME_STATE
 
 SURPRISING = 1e-4
 """Probability of a measurement below which the structure is looked for on other sheets."""
-STALE = 1.0
-"""Change of the loads, in standard deviations, after which the whole route is checked again."""
 
 Command = Mapping[str, float]
 
@@ -203,7 +200,9 @@ class Controller:
         belief = self._estimated(belief, Measurement.of(measured, self.errors))
         if belief.status == ControlStatus.NOT_EXPLAINED:
             return belief
-        belief, likely = self._passed(belief), self._likely(belief)
+        here = belief.state.p[self._actuators]
+        belief = replace(belief, way_points=ahead_of(belief.way_points, self.eset.names, here))
+        likely = self._likely(belief)
         place, ahead = self._strides.begin(belief.state, self._next_place(belief), likely)
         if not place.safe[0]:
             return self._retreat(belief, likely)
@@ -252,27 +251,23 @@ class Controller:
         if len(measured.values) == 0:
             return replace(belief, covariance=prior, status=ControlStatus.FOLLOWING, why="")
         best = self._fit(belief.state, prior, measured)
-        if self._is_surprising(best, measured):  # a load jumped, or the structure did
+        if best.chance < SURPRISING:  # a load jumped, or the structure did
             wide = prior + np.diag(self._jumps**2)
             fits = [self._fit(each, wide, measured) for each in self._sheets(belief)]
             best = min((best, *fits), key=lambda each: each.misfit)
-        likely = float(chi2.sf(best.misfit, len(measured.values)))
-        if self._is_surprising(best, measured):
+        if best.chance < SURPRISING:
             why = f"chi-squared {best.misfit:.3g} of {len(measured.values)} measured values"
             return replace(
-                belief, status=ControlStatus.NOT_EXPLAINED, why=why, surprise=likely,
+                belief, status=ControlStatus.NOT_EXPLAINED, why=why, surprise=best.chance,
                 covariance=prior,
             )  # fmt: skip
         return replace(
-            belief, state=best.state, covariance=best.covariance, surprise=likely,
+            belief, state=best.state, covariance=best.covariance, surprise=best.chance,
             status=ControlStatus.FOLLOWING, why="",
         )  # fmt: skip
 
     def _fit(self, state: State, prior: np.ndarray, measured: Measurement) -> Estimate:
         return fitted(state, self._loads, prior, measured)
-
-    def _is_surprising(self, estimate: Estimate, measured: Measurement) -> bool:
-        return bool(chi2.sf(estimate.misfit, len(measured.values)) < SURPRISING)
 
     def _sheets(self, belief: Belief) -> list[State]:
         """The state, and the others at the command under the loads that were estimated last."""
@@ -285,16 +280,19 @@ class Controller:
 
     def _likely(self, belief: Belief) -> LikelyLoads:
         """Loads about the estimated ones, without and with jumps."""
-        spread = self.deviations * np.sqrt(np.diag(belief.covariance + self._drift))
-        loads = belief.state.p[self._loads]
+        loads, spread = belief.state.p[self._loads], self._spread(belief)
         return LikelyLoads.around(self._loads, loads, spread, self._jumps, self._demands)
 
     # what is done
 
     def _is_stale(self, belief: Belief) -> bool:
+        """Whether the loads have left those, jumps apart, for which the whole route was checked."""
         change = belief.state.p[self._loads] - belief.checked
-        spread = np.sqrt(np.diag(belief.covariance + self._drift))
-        return bool((np.abs(change) > STALE * spread).any())
+        return bool((np.abs(change) > self._spread(belief)).any())
+
+    def _spread(self, belief: Belief) -> Values:
+        """How far likely loads are from the estimated ones, jumps apart."""
+        return np.asarray(self.deviations * np.sqrt(np.diag(belief.covariance + self._drift)))
 
     def _follows_safely(self, belief: Belief, likely: LikelyLoads, place: Bundles) -> bool:
         return route_is_safe(place, belief.way_points, self._goal.batch, likely)
@@ -328,23 +326,11 @@ class Controller:
             why="",
         )
 
-    def _passed(self, belief: Belief) -> Belief:
-        """Belief without the way-points that it has reached."""
-        here, ahead = belief.state.p[self._actuators], list(belief.way_points)
-        while ahead and np.allclose(self._setting(ahead[0], here), here, 0, SAME_TO_ROUNDING):
-            ahead.pop(0)
-        return replace(belief, way_points=tuple(ahead))
-
-    def _setting(self, point: Command, here: Values) -> Values:
-        """A way-point as an array; actuators that it does not name stay."""
-        named = zip(self.eset.names, here, strict=True)
-        return np.array([point.get(name, value) for name, value in named])
-
     def _next_place(self, belief: Belief) -> Values | None:
         """Actuators to go to: the next way-point, or what meets the moving target; None if none."""
         if self._target is None:
             here, ahead = belief.state.p[self._actuators], belief.way_points
-            return self._setting(ahead[0], here) if ahead else None
+            return setting_of(ahead[0], self.eset.names, here) if ahead else None
         there = self._target.place(belief.state, self._leg(belief))
         return there if there is not None and self.eset.box.holds(there, slack=0.0) else None
 

@@ -9,6 +9,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.stats import chi2
 
 from equimorph.array_types import Float
 from equimorph.arrays import Values
@@ -83,11 +84,14 @@ class Estimate:
         Posterior covariance of the loads (k, k).
     misfit
         χ²: squared residuals of measurement and prior.
+    chance
+        Probability of a misfit as large as that.
     """
 
     state: State
     covariance: Covariance
     misfit: float
+    chance: float
 
 
 def fitted(prior: State, at: Places, covariance: Covariance, measured: Measurement) -> Estimate:
@@ -122,7 +126,9 @@ def fitted(prior: State, at: Places, covariance: Covariance, measured: Measureme
         else:
             break
     posterior = np.linalg.inv(slopes.T @ slopes) * np.outer(scales, scales)
-    return Estimate(here[0], posterior, float(left @ left))
+    misfit = float(left @ left)
+    chance = float(chi2.sf(misfit, len(measured.values)))
+    return Estimate(here[0], posterior, misfit, chance)
 
 
 def _after(here: States, at: Places, along: Linearisation, change: Loads) -> Iterator[States]:

@@ -1,5 +1,6 @@
 """Strides of the actuators, none beyond what is safe under all likely loads."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -8,6 +9,9 @@ from equimorph.arrays import Values
 from equimorph.control.likely import Bundles, LikelyLoads, Places, moved
 from equimorph.model import Box
 from equimorph.structures import State, States, join_states
+from equimorph.tolerances import SAME_TO_ROUNDING
+
+WayPoints = tuple[Mapping[str, float], ...]
 
 SHARES = (1.0, 0.5, 0.25)
 """Parts of a stride that are tried, the longest first."""
@@ -91,3 +95,16 @@ class Strides:
         if not borne.safe.any():
             return None
         return borne.estimated[int(np.argmax(np.where(borne.safe, borne.margins, -np.inf)))]
+
+
+def ahead_of(points: WayPoints, names: tuple[str, ...], here: Values) -> WayPoints:
+    """Way-points without the first ones that are where the actuators are."""
+    for number, point in enumerate(points):
+        if not np.allclose(setting_of(point, names, here), here, rtol=0, atol=SAME_TO_ROUNDING):
+            return points[number:]
+    return ()
+
+
+def setting_of(point: Mapping[str, float], names: tuple[str, ...], here: Values) -> Values:
+    """A way-point as an array; actuators that it does not name stay."""
+    return np.array([point.get(name, value) for name, value in zip(names, here, strict=True)])
