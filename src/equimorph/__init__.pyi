@@ -211,9 +211,11 @@ from .tasks.verification.schedule_check import (
     verify as verify,
     Verification as Verification,
 )
+from .tasks.verification.evidence import (
+    ProofStatus as ProofStatus,
+)
 from .tasks.verification.proof import (
     Proof as Proof,
-    ProofStatus as ProofStatus,
 )
 from .tasks.motion.tracking import (
     track as track,

@@ -9,7 +9,8 @@ from equimorph.argument_checks import check_arguments
 from equimorph.errors import InputError
 from equimorph.model import names_of
 from equimorph.storage.files import write_text
-from equimorph.tasks.verification.proof import Proof, ProofStatus
+from equimorph.tasks.verification.evidence import ProofStatus
+from equimorph.tasks.verification.proof import Proof
 
 FORMAT = "route certificate, version 1"
 """First entry of a certificate."""

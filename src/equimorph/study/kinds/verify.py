@@ -12,7 +12,8 @@ from equimorph.storage import write_certificate
 from equimorph.study import html
 from equimorph.study.answers import as_route, figures_of_way
 from equimorph.study.question import Figure, Kind, Question
-from equimorph.tasks.verification.proof import Proof, ProofStatus
+from equimorph.tasks.verification.evidence import ProofStatus
+from equimorph.tasks.verification.proof import Proof
 from equimorph.tasks.verification.schedule_check import Verification, verify
 
 STANDINGS: Mapping[ProofStatus, tuple[str, str]] = {

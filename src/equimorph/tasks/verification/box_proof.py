@@ -15,7 +15,7 @@ from equimorph.equilibria import Event, lift
 from equimorph.equilibria.legs import check_starts
 from equimorph.model import Box, position
 from equimorph.structures import State, States, join_states
-from equimorph.tasks.verification.proof import (
+from equimorph.tasks.verification.evidence import (
     Evidence,
     ProofStatus,
     kind_of_bounds,

@@ -22,15 +22,14 @@ from equimorph.equilibria.trace_options import EventCode
 from equimorph.model import Constraint, worst_relative_excess
 from equimorph.structures import State, States
 from equimorph.tasks.verification.error_box import Deviation, ErrorBox
-from equimorph.tasks.verification.newton_kantorovich import Bounds, segment_bounds
-from equimorph.tasks.verification.proof import (
-    LARGEST_SAGITTA,
+from equimorph.tasks.verification.evidence import (
     ProofStatus,
     bounds_in_parts,
     kind_of_bounds,
     no_bounds,
     standing,
 )
+from equimorph.tasks.verification.newton_kantorovich import Bounds, segment_bounds
 
 MOST_CELLS = 20_000
 """Cells that are tried at most before the proof of a tube is given up."""
@@ -38,6 +37,8 @@ MOST_ENTRIES = 20_000_000
 """Entries of their matrices that are."""
 MOST_ROUNDS = 14
 """Bisections of a segment and of the box around it before that."""
+LARGEST_SAGITTA = 0.25
+"""Distance of the exact state from the expected one, relative to the way there, that is a bend."""
 LEAST_SHARE = 1e-12
 """What half widths, squared, count beside the moves of states where a cell is cut."""
 HOPELESS = 4.0
