@@ -37,6 +37,13 @@ def test_the_strip_snaps_when_one_end_turns_alone():
     assert -2 * end.state["Theta"] == pytest.approx(1.7818 * np.sqrt(0.05), rel=0.01)
 
 
+def test_the_shallow_m_sways_when_its_clamps_reach_twice_the_root_of_the_shortening():
+    """y' = −α sin(kx)/sin(k/2), tan(k/2) = k/2: the shortening ½∫y'² is α²/4; error O(1 − ν)."""
+    limit = em.limit_load(example("m_shape").hanging(em.Rod(), 0.999), "Theta")
+    assert limit.kind == "branch point"
+    assert limit.value == pytest.approx(2.0 * np.sqrt(1e-3), rel=1.1e-4)
+
+
 def test_the_straight_arm_buckles_under_pi_squared_over_four():
     """A cantilever's Euler load; in the units of the file. 1e-9: located to round-off."""
     arm = study("arm").structure
