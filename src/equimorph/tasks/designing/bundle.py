@@ -21,16 +21,6 @@ FEASIBLE = 1e-6
 """Excess over bounds, relative to their size, that is none; larger ones are made smaller first."""
 STEPS = 30
 """Steps of SLSQP within one trust region."""
-ACTIVE = 1e-3
-"""Relative distance from the largest value up to which pieces are reported as active."""
-PENALTY = 1e3
-"""Of the largest excess over bounds."""
-FEASIBLE = 1e-6
-"""Excess over bounds, relative to their size, that is none; larger ones are made smaller first."""
-STEPS = 30
-"""Steps of SLSQP within one trust region."""
-ACTIVE = 1e-3
-"""Relative distance from the largest value up to which pieces are reported as active."""
 
 
 @dataclass(frozen=True)

@@ -19,14 +19,6 @@ from equimorph.tasks.designing.search import DesignSearch, DesignStatus, DesignS
 
 EQUILIBRIUM = 1e-6
 """Residual up to which states are equilibria."""
-OTHERS = 3
-"""Other designs whose events are kept in sight, the last ones."""
-FAR = 3.0
-"""Factor on the slopes of bounds by which those are told that may be met in a trust region."""
-STEPS = 30
-"""Steps of SLSQP within one trust region."""
-ACTIVE = 1e-3
-"""Relative distance from the largest value up to which pieces are reported as active."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,72 +15,8 @@ WIDE = 0.05
 """Size of the trust region beyond which no gain in it means an optimum."""
 SHARE = 0.1
 """Share of the predicted gain that a rebuilt design must have to be accepted."""
-EQUILIBRIUM = 1e-6
-"""Residual up to which states are equilibria."""
 OTHERS = 3
 """Other designs whose events are kept in sight, the last ones."""
-FAR = 3.0
-"""Factor on the slopes of bounds by which those are told that may be met in a trust region."""
-STEPS = 30
-"""Steps of SLSQP within one trust region."""
-KEPT = 0.99
-"""Share of a violation that must remain, to first order, where nothing nearby obeys bounds."""
-ACTIVE = 1e-3
-"""Relative distance from the largest value up to which pieces are reported as active."""
-WIDE = 0.05
-"""Size of the trust region beyond which no gain in it means an optimum."""
-SHARE = 0.1
-"""Share of the predicted gain that a rebuilt design must have to be accepted."""
-EQUILIBRIUM = 1e-6
-"""Residual up to which states are equilibria."""
-OTHERS = 3
-"""Other designs whose events are kept in sight, the last ones."""
-FAR = 3.0
-"""Factor on the slopes of bounds by which those are told that may be met in a trust region."""
-STEPS = 30
-"""Steps of SLSQP within one trust region."""
-KEPT = 0.99
-"""Share of a violation that must remain, to first order, where nothing nearby obeys bounds."""
-ACTIVE = 1e-3
-"""Relative distance from the largest value up to which pieces are reported as active."""
-SHARE = 0.1
-"""Share of the predicted gain that a rebuilt design must have to be accepted."""
-EQUILIBRIUM = 1e-6
-"""Residual up to which states are equilibria."""
-OTHERS = 3
-"""Other designs whose events are kept in sight, the last ones."""
-FAR = 3.0
-"""Factor on the slopes of bounds by which those are told that may be met in a trust region."""
-STEPS = 30
-"""Steps of SLSQP within one trust region."""
-KEPT = 0.99
-"""Share of a violation that must remain, to first order, where nothing nearby obeys bounds."""
-ACTIVE = 1e-3
-"""Relative distance from the largest value up to which pieces are reported as active."""
-SHARE = 0.1
-"""Share of the predicted gain that a rebuilt design must have to be accepted."""
-EQUILIBRIUM = 1e-6
-"""Residual up to which states are equilibria."""
-OTHERS = 3
-"""Other designs whose events are kept in sight, the last ones."""
-FAR = 3.0
-"""Factor on the slopes of bounds by which those are told that may be met in a trust region."""
-STEPS = 30
-"""Steps of SLSQP within one trust region."""
-KEPT = 0.99
-"""Share of a violation that must remain, to first order, where nothing nearby obeys bounds."""
-ACTIVE = 1e-3
-"""Relative distance from the largest value up to which pieces are reported as active."""
-KEPT = 0.99
-"""Share of a violation that must remain, to first order, where nothing nearby obeys bounds."""
-ACTIVE = 1e-3
-"""Relative distance from the largest value up to which pieces are reported as active."""
-OTHERS = 3
-"""Other designs whose events are kept in sight, the last ones."""
-FAR = 3.0
-"""Factor on the slopes of bounds by which those are told that may be met in a trust region."""
-STEPS = 30
-"""Steps of SLSQP within one trust region."""
 KEPT = 0.99
 """Share of a violation that must remain, to first order, where nothing nearby obeys bounds."""
 ACTIVE = 1e-3

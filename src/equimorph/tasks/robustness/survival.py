@@ -105,14 +105,10 @@ def survival_room(
 
     Parameters
     ----------
-    start
-        State of the perfect structure in which the schedule begins.
-    schedule
-        A schedule of the structure, or way-points.
+    start, schedule, within
+        As of `survival`.
     survive
         Half widths of the box by name; it is scaled as a whole.
-    within
-        Constraints to obey.
 
     Returns
     -------
