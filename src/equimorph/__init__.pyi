@@ -129,6 +129,22 @@ from .dynamics import (
     Shock as Shock,
 )
 
+# Words of multistable structures
+from .tasks.words.strokes import (
+    word_graph as word_graph,
+)
+from .tasks.words.over_set import (
+    word_graph_over as word_graph_over,
+)
+from .tasks.words.word_graph import (
+    WordGraph as WordGraph,
+    WordRoute as WordRoute,
+    WordMove as WordMove,
+)
+from .tasks.words.row import (
+    Row as Row,
+)
+
 # Follow critical states
 from .equilibria import (
     fold_curve as fold_curve,

@@ -21,6 +21,7 @@ from equimorph.plotting.strongest import beside_strongest, strongest_settings
 from equimorph.plotting.style import house_style, save
 from equimorph.plotting.surface import surface
 from equimorph.plotting.transitions import disconnectivity, energy_path, least_barriers
+from equimorph.plotting.words import words
 
 __all__ = [
     "alternative_routes",
@@ -59,4 +60,5 @@ __all__ = [
     "strongest_settings",
     "surface",
     "trials",
+    "words",
 ]

@@ -19,7 +19,7 @@ ORDER = (
         "room",
         "snap",
     ),
-    *("snap_graph", "transition_network", "barriers", "least_shock"),
+    *("snap_graph", "transition_network", "barriers", "least_shock", "words"),
     *("trials", "estimate", "calibration", "map", "strongest", "chart", "reduction"),
 )
 """Order in which kinds are answered and reported; further kinds follow by their names."""

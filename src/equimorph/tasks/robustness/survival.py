@@ -105,10 +105,14 @@ def survival_room(
 
     Parameters
     ----------
-    start, schedule, within
-        As of `survival`.
+    start
+        State of the perfect structure in which the schedule begins.
+    schedule
+        A schedule of the structure, or way-points.
     survive
         Half widths of the box by name; it is scaled as a whole.
+    within
+        Constraints to obey.
 
     Returns
     -------

@@ -1,0 +1,1 @@
+"""Multistable structures: the words of their stable states, and which lead to which."""
