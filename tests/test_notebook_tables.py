@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import equimorph as em
-from equimorph.html_tables import html_table
+from equimorph.tables import html_table
 from equimorph.tasks.route import refusal
 
 

@@ -1,6 +1,6 @@
 import pytest
 
-from equimorph.cli.progress import ScreenProgress
+from equimorph.cli.output import ScreenProgress
 
 
 def test_nothing_is_drawn_before_the_first_report(capsys: pytest.CaptureFixture[str]):

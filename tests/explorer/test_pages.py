@@ -11,10 +11,9 @@ import numpy as np
 import pytest
 
 import equimorph as em
-from equimorph.explorer.curved_edges import curved_edges
+from equimorph.explorer.contents import curved_edges, study_text, toml
 from equimorph.explorer.packing import json_in_html, pack, quantise
 from equimorph.explorer.pictures import FIDELITY, gallery
-from equimorph.explorer.study_text import study_text, toml
 from equimorph.manifold import edge_middles
 from equimorph.study.problem import parse_study
 from oracles.specimens import SPECIMENS

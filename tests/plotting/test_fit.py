@@ -11,7 +11,7 @@ from PIL import Image
 import equimorph as em
 from equimorph import plotting
 from equimorph.plotting import style
-from equimorph.plotting.fit import label_boxes, touching, whole_figure
+from equimorph.plotting.style import label_boxes, touching, whole_figure
 from typecheck import unchecked
 
 LOAD = "force_that_pushes_the_crown_of_the_arch_down"

@@ -21,10 +21,10 @@ from equimorph.charts.preference import Preference, preferred_part
 from equimorph.charts.preparation import cut_along_crossings, with_cusp_vertices
 from equimorph.charts.rules import Rule, Scores, rule_of
 from equimorph.errors import InputError
-from equimorph.html_tables import html_table
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Constraint, Descriptor
 from equimorph.structures import States
+from equimorph.tables import html_table
 from equimorph.tolerances import IN_BOX
 
 ON_BARRIER = 1e-9

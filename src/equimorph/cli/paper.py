@@ -5,7 +5,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from equimorph.cli.progress import ScreenProgress
+from equimorph.cli.output import ScreenProgress
 from equimorph.paper import reproduce
 from equimorph.paper.reproduction import in_words
 

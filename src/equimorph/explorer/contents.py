@@ -5,6 +5,8 @@ the vertices of the set in one list, so that everything that the page shows is a
 or lies in a cell.
 """
 
+import json
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -12,25 +14,111 @@ from typing import Any
 import numpy as np
 
 from equimorph.array_types import Int, Num
+from equimorph.arrays import Values
 from equimorph.charts import Reduction
 from equimorph.errors import InputError
-from equimorph.explorer.curved_edges import curved_edges
 from equimorph.explorer.packing import quantise
-from equimorph.explorer.pictures import gallery
-from equimorph.explorer.study_text import study_text
-from equimorph.manifold import EquilibriumSet, SnapGraph, overturned_cells
+from equimorph.explorer.pictures import FIDELITY, gallery, size_of
+from equimorph.manifold import (
+    EdgeMiddles,
+    EquilibriumSet,
+    SnapGraph,
+    edge_middles,
+    overturned_cells,
+)
 from equimorph.model import Constraint, Descriptor, Disc, Obstacle
 from equimorph.plotting.curves import corner_steps, snap_steps
 from equimorph.plotting.support_symbols import AWAY, SYMBOLS, UPRIGHT
 from equimorph.structures import States, effort_of, join_states, margin_of
 from equimorph.tasks.route import Route
 
+_AT_ONCE = 8192
+"""States whose shapes or scalars are computed together."""
+
+
+def curved_edges(eset: EquilibriumSet) -> EdgeMiddles:
+    """Edges whose middle is elsewhere than the mean of its ends, by more than `FIDELITY`.
+
+    That is a share of the size of the structure, or of the box of parameters.
+    """
+    middles, size = edge_middles(eset), size_of(eset.points)
+    starts = range(0, len(middles.ends), _AT_ONCE)
+    bends = [_bends(eset, middles, slice(first, first + _AT_ONCE)) for first in starts]
+    places = middles.states.p[:, eset.setting.free] - eset.coordinates[middles.ends].mean(axis=1)
+    moved = np.abs(places / (eset.box.upper - eset.box.lower)).max(axis=1, initial=0.0)
+    bent = np.maximum(np.concatenate([np.zeros(0), *bends]) / size, moved) > FIDELITY
+    return EdgeMiddles(middles.ends[bent], middles.states[bent])
+
+
+def _bends(eset: EquilibriumSet, middles: EdgeMiddles, some: slice) -> Values:
+    """How far, at most, a point of a shape is from the mean of where it is at both ends."""
+    first, second = (eset.points[end].shape() for end in middles.ends[some].T)
+    gap = middles.states[some].shape() - 0.5 * (first + second)
+    return np.asarray(np.linalg.norm(gap, axis=2).max(axis=1))
+
+
+_BARE = re.compile(r"[A-Za-z0-9_-]+")
+
+
+def study_text(eset: EquilibriumSet, title: str) -> str:
+    """Title, structure and set as a study file, to which the page adds routes.
+
+    Raises
+    ------
+    InputError
+        If the structure cannot be written down, as with loads that are functions.
+    """
+    structure = {k: v for k, v in eset.structure.identity().items() if v is not None}
+    sides = zip(eset.names, eset.box.lower.tolist(), eset.box.upper.tolist(), strict=True)
+    section: dict[str, Any] = {"box": {name: [low, high] for name, low, high in sides}}
+    if eset.fixed:
+        section["fixed"] = {name: float(value) for name, value in eset.fixed.items()}
+    validity = {str(each) for each in eset.structure.validity}
+    within = [str(each) for each in eset.constraints if str(each) not in validity]
+    if within:
+        section["within"] = within
+    section["intervals"] = list(eset.intervals)
+    lines = [f"title = {toml(title)}", "", "[structure]"]
+    lines += [f"{_key(key)} = {toml(value)}" for key, value in structure.items()]
+    lines += ["", "[set]", *(f"{_key(key)} = {toml(value)}" for key, value in section.items())]
+    return "\n".join(lines) + "\n"
+
+
+def toml(value: Any) -> str:
+    """A value as TOML on one line.
+
+    Raises
+    ------
+    InputError
+        For what TOML has no form for.
+
+    Examples
+    --------
+    >>> toml({"a": [1, 2.5], "b c": "d"})
+    '{ a = [1, 2.5], "b c" = "d" }'
+    """
+    if isinstance(value, np.ndarray | np.generic):
+        value = value.tolist()
+    if isinstance(value, Mapping):
+        items = [f"{_key(k)} = {toml(v)}" for k, v in value.items() if v is not None]
+        return "{ " + ", ".join(items) + " }" if items else "{}"
+    if isinstance(value, bool | str):
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007F")
+    if isinstance(value, int | float):
+        return repr(value)
+    if isinstance(value, Sequence):
+        return "[" + ", ".join(toml(each) for each in value) + "]"
+    raise InputError(f"`structure` must be plain data to be written down; got {value!r}.")
+
+
+def _key(name: str) -> str:
+    return name if _BARE.fullmatch(name) else json.dumps(name, ensure_ascii=False)
+
+
 _ROUTE_STATES = 400
 """States of a route that a page holds."""
 _EXACT = ("stability_margin", "energy")
 """Scalars of which small differences matter: they are kept as single floats."""
-_AT_ONCE = 8192
-"""States whose scalars are computed together."""
 
 Arrays = dict[str, Num[np.ndarray, "..."]]
 

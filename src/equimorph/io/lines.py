@@ -14,11 +14,7 @@ from equimorph.argument_checks import check_arguments
 from equimorph.argument_kinds import one_of
 from equimorph.array_types import Float, Int
 from equimorph.errors import InputError
-from equimorph.io.compas import read_compas
-from equimorph.io.drawing import Drawing
-from equimorph.io.dxf import read_dxf
-from equimorph.io.ply import read_ply
-from equimorph.io.vtk import read_vtk
+from equimorph.io.formats import Drawing, read_compas, read_dxf, read_ply, read_vtk
 from equimorph.model.units import LENGTH, UNITS
 
 SAME_PLACE = 1e-6

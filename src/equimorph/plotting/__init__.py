@@ -1,23 +1,18 @@
 """Figures and films of results; nothing else in the package draws."""
 
-from equimorph.plotting.calibration import calibration
 from equimorph.plotting.charts import chart_domain, parameterisation
-from equimorph.plotting.diagram import diagram
 from equimorph.plotting.film import film
-from equimorph.plotting.followed import followed
-from equimorph.plotting.landscape import landscape
 from equimorph.plotting.level_plane import level_plane
 from equimorph.plotting.maps import curvature_map, load_map
-from equimorph.plotting.margins import margins
-from equimorph.plotting.plane import parameter_plane, solutions
+from equimorph.plotting.optima import beside_strongest, followed, landscape, strongest_settings
+from equimorph.plotting.plane import diagram, parameter_plane, solutions
 from equimorph.plotting.reach import reach_panels, reach_parameters, reach_plane
 from equimorph.plotting.replays import deviation_over_time, replay_film
 from equimorph.plotting.robustness import imperfection_laws, room, sensitivities, trials
 from equimorph.plotting.route_panels import alternative_routes, route_panels
-from equimorph.plotting.schedule_strips import schedule_strips
-from equimorph.plotting.shapes import portraits, shapes
+from equimorph.plotting.schedules import margins, schedule_strips
+from equimorph.plotting.shapes import calibration, portraits, shapes
 from equimorph.plotting.snaps import snap_panels
-from equimorph.plotting.strongest import beside_strongest, strongest_settings
 from equimorph.plotting.style import house_style, save
 from equimorph.plotting.surface import surface
 from equimorph.plotting.transitions import disconnectivity, energy_path, least_barriers

@@ -13,8 +13,7 @@ from equimorph.storage.results import (
     write_results,
 )
 from equimorph.storage.schedule import read_schedule, write_schedule
-from equimorph.storage.shapes import write_shapes
-from equimorph.storage.surface import write_surface
+from equimorph.storage.surface import write_shapes, write_surface
 from equimorph.storage.trajectory import trajectory_message, write_trajectory
 
 __all__ = [

@@ -19,7 +19,7 @@ from equimorph.storage.charts import read_chart, write_chart
 from equimorph.storage.hdf import content, get_json, open_file, put_json
 from equimorph.storage.maps import read_map_group, write_map_group
 from equimorph.storage.owner import Owner
-from equimorph.storage.routes import read_route, write_route
+from equimorph.storage.schedule import read_route, write_route
 from equimorph.storage.schemas import UnreadableError
 from equimorph.storage.sets import read_set, write_set
 from equimorph.storage.values import read_states, read_value, write_states, write_value

@@ -17,7 +17,6 @@ from equimorph.argument_checks import check_arguments
 from equimorph.array_types import Float, Int
 from equimorph.arrays import Flags, Lanes, Parameters, Values, Velocity
 from equimorph.errors import InputError, MissingError, suggestion
-from equimorph.html_tables import html_table
 from equimorph.model import (
     Call,
     Constraint,
@@ -31,6 +30,7 @@ from equimorph.model import (
 )
 from equimorph.structures.approach import straight_arcs
 from equimorph.structures.equations import Equations
+from equimorph.tables import html_table
 
 
 @dataclass(frozen=True)

@@ -12,12 +12,11 @@ from equimorph.argument_checks import check_arguments
 from equimorph.array_types import Float, Int
 from equimorph.arrays import Flags, Lanes, Parameters, Values
 from equimorph.errors import InputError, MissingError
-from equimorph.html_tables import html_table
 from equimorph.model import Drawing, names_of, position
 from equimorph.structures.contract import Structure
 from equimorph.structures.margin import stability_margin
 from equimorph.structures.vibration import vibrations
-from equimorph.tables import heading, units_of
+from equimorph.tables import heading, html_table, units_of
 
 SHOWN = 20
 """Number of states that notebooks show."""

@@ -17,6 +17,7 @@ from equimorph.errors import InputError
 from equimorph.model import Box, names_of
 from equimorph.study.lookup import (
     Ground,
+    RuleSection,
     at_key,
     check_parameters,
     check_point,
@@ -24,8 +25,8 @@ from equimorph.study.lookup import (
     constraints_of,
     descriptor_at,
     descriptors_of,
+    rule_of,
 )
-from equimorph.study.rules import RuleSection, rule_of
 from equimorph.study.states import (
     ChosenState,
     NaturalSection,

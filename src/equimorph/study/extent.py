@@ -10,8 +10,8 @@ from equimorph.errors import InputError
 from equimorph.manifold import INTERVALS, equilibrium_set
 from equimorph.model import Box, Constraint, parameter_vector
 from equimorph.structures import Structure
+from equimorph.study.complaint import Findings
 from equimorph.study.fields import ComparisonText, Count, Interval, Point, Section, requirement
-from equimorph.study.findings import Findings
 from equimorph.study.lookup import Extent, at_key, check_value, constraints_of
 from equimorph.study.signatures import arguments_of
 

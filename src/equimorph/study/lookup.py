@@ -1,4 +1,4 @@
-"""Names of a study file, looked up: parameters, descriptors, points, with the key of what fails."""
+"""Parameters, descriptors, points and rules of a study, looked up; the key of what fails."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Generator, Iterable, Mapping, Sequence
@@ -7,13 +7,15 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from pydantic import model_validator
 
+from equimorph import charts
 from equimorph.equilibria import worst_named
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Box, Constraint, Descriptor, position
 from equimorph.structures import Structure
-from equimorph.study.fields import parse_comparison
+from equimorph.study.fields import Positive, Section, parse_comparison, requirement
 
 LARGEST_ANGLE = 20.0
 """Radians; ends turned further against each other need curvatures above 40 everywhere."""
@@ -142,3 +144,43 @@ def descriptors_of(
 ) -> dict[Descriptor, float]:
     """Look up the descriptors of values."""
     return {descriptor_at(structure, text, key): value for text, value in values.items()}
+
+
+class RuleSection(Section):
+    """Which of the states over a point is preferred; see `equimorph.reduce`."""
+
+    highest: str | None = None
+    lowest: str | None = None
+    quasi_static: str | None = None
+    first_stable_on_path: str | None = None
+    bound: Positive | None = None
+
+    @model_validator(mode="after")
+    def _one_rule(self) -> "RuleSection":
+        rules = (self.highest, self.lowest, self.quasi_static, self.first_stable_on_path)
+        if sum(rule is not None for rule in rules) != 1:
+            raise requirement("give one of highest, lowest, quasi_static, first_stable_on_path")
+        if self.bound is not None and self.first_stable_on_path is None:
+            raise requirement("give a bound of the load to first_stable_on_path only")
+        return self
+
+
+def rule_of(ground: Ground, section: RuleSection, key: str) -> charts.Rule:
+    """Rule that a section describes.
+
+    Raises
+    ------
+    InputError
+        For a descriptor or parameter that the structure does not have.
+    """
+    if section.highest is not None:
+        return charts.highest(descriptor_at(ground.structure, section.highest, f"{key}.highest"))
+    if section.lowest is not None:
+        return charts.lowest(descriptor_at(ground.structure, section.lowest, f"{key}.lowest"))
+    if section.quasi_static is not None:
+        check_parameters(ground.structure, [section.quasi_static], f"{key}.quasi_static")
+        return charts.quasi_static(section.quasi_static)
+    load = section.first_stable_on_path or ""
+    check_parameters(ground.structure, [load], f"{key}.first_stable_on_path")
+    bound = {} if section.bound is None else {"bound": section.bound}
+    return charts.first_stable_on_path(load, **bound)

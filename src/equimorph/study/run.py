@@ -2,11 +2,12 @@
 
 from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass, field
 from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 from time import perf_counter
-from typing import Any
+from typing import Any, TypeVar, cast
 
 from pydantic import ValidationError
 
@@ -16,21 +17,101 @@ from equimorph.logs import log_of
 from equimorph.manifold import EquilibriumSet, equilibrium_set
 from equimorph.model import Progress, Silent, Workers
 from equimorph.storage import write_results
-from equimorph.storage.files import link_file, read_text
-from equimorph.structures import States
-from equimorph.study.checkpoints import Checkpoints
-from equimorph.study.findings import StudyError, lines_of
-from equimorph.study.folder import ResultsFolder, open_results_folder
+from equimorph.storage.files import checksum, fingerprint, link_file, move_whole, read_text
+from equimorph.storage.records import content_of, load_record
+from equimorph.structures import States, Structure
+from equimorph.study.complaint import StudyError, lines_of
+from equimorph.study.folder import ResultsFolder, open_results_folder, writable
 from equimorph.study.lookup import Extent, Ground, at_key
 from equimorph.study.memory import MemoryWatch, check_memory
-from equimorph.study.names import GRID, INPUT_COPY, REPORT, RESULTS, route_name
 from equimorph.study.prepare import Answered, Outcome, Problem, prepare
 from equimorph.study.problem import Study, parse_study, read_study_text, sound_part
-from equimorph.study.question import Question
+from equimorph.study.question import GRID, INPUT_COPY, REPORT, RESULTS, Question, route_name
 from equimorph.study.report import draw_figures, report
 from equimorph.tasks.route import Route
 
 LOG = log_of(__name__)
+Answer = TypeVar("Answer")
+
+
+@dataclass
+class Checkpoints:
+    """Answers in a hidden part of a results folder, to go on from after any interruption.
+
+    An answer's file is named after a fingerprint of its question and a checksum of its content. It
+    is found by asking the same question again, in this study or an edited one; a damaged file is
+    not read.
+
+    Parameters
+    ----------
+    results
+        The results folder, open.
+    structure
+        To which the answers belong.
+    asked
+        Fingerprints of the questions of this run so far.
+    found
+        Those whose answers were there already.
+    """
+
+    results: ResultsFolder
+    structure: Structure
+    asked: set[str] = field(default_factory=set)
+    found: set[str] = field(default_factory=set)
+
+    def answer(self, question: dict[str, Any], compute: Callable[[], Answer]) -> Answer:
+        """Return the stored answer to a question; without one, compute it and store it.
+
+        The answer is always the one read from the file, so that a run that was interrupted goes on
+        from the very numbers that it would have had.
+
+        Parameters
+        ----------
+        question
+            All that the answer depends on, as plain data.
+        compute
+            Finds the answer.
+
+        Raises
+        ------
+        InputError
+            If the folder cannot be written.
+        """
+        key = fingerprint(question)
+        self.asked.add(key)
+        for file in self.results.checkpoints.glob(f"{key}-*"):
+            found = self._load(file)
+            if found is not None:
+                self.found.add(key)
+                LOG.info("answer %s read from an earlier run", file.name)
+                (kept,) = found
+                return cast(Answer, kept)
+            file.unlink()
+        file = self._store(key, content_of(compute()))
+        return cast(Answer, load_record(file, self.structure))
+
+    def forget_others(self) -> None:
+        """Remove answers to questions that this run did not ask."""
+        for file in self.results.checkpoints.iterdir():
+            if file.name.partition("-")[0] not in self.asked:
+                file.unlink()
+
+    def _store(self, key: str, content: bytes) -> Path:
+        file = self.results.checkpoints / f"{key}-{checksum(content)}"
+        partial = self.results.checkpoints / "partial"
+        with writable(self.results.path):
+            partial.write_bytes(content)
+            move_whole(partial, file)
+        return file
+
+    def _load(self, file: Path) -> tuple[Any] | None:
+        """Return the answer in a file, unless it is damaged or of another release."""
+        if not file.name.endswith(checksum(file.read_bytes())):
+            return None
+        try:
+            return (load_record(file, self.structure),)
+        except InputError:
+            return None
 
 
 @check_arguments

@@ -42,7 +42,7 @@ from equimorph.study.fields import (
     Seed,
     Step,
 )
-from equimorph.study.rules import RuleSection
+from equimorph.study.lookup import RuleSection
 from equimorph.study.states import NaturalSection, StateSection
 from equimorph.tasks.robustness.erring import Errors
 

@@ -9,9 +9,9 @@ import numpy as np
 from equimorph.array_types import Float
 from equimorph.equilibria import Event, Landing, Path, TraceOptions, lift, lift_legs
 from equimorph.errors import InputError
-from equimorph.html_tables import html_table
 from equimorph.model import Constraint, Descriptor, Schedule, names_of
 from equimorph.structures import State, States, Structure
+from equimorph.tables import html_table
 from equimorph.tasks.distances import distance
 from equimorph.tasks.robustness.evidence import Survival
 from equimorph.tolerances import SAME_STATE

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from scipy.special import betaincinv
 
-from equimorph.html_tables import html_table
+from equimorph.tables import html_table
 
 SMALL_RESIDUAL = 1e-9
 """Largest residual of a clean set."""

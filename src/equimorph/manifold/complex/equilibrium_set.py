@@ -11,7 +11,6 @@ from equimorph.argument_checks import check_arguments
 from equimorph.array_types import Float, Int
 from equimorph.arrays import CellNumbers, Cells, Flags, Numbers, VertexNumbers
 from equimorph.errors import InputError
-from equimorph.html_tables import html_table
 from equimorph.manifold.complex.audit import Audit
 from equimorph.manifold.complex.base_mesh import BaseMesh
 from equimorph.manifold.geometry.points import VertexKind
@@ -21,7 +20,7 @@ from equimorph.manifold.lookup.over import Sheets
 from equimorph.manifold.lookup.states_over import StatesOver
 from equimorph.model import Box, Constraint, parameter_vector, position
 from equimorph.structures import States, Structure
-from equimorph.tables import Table, Tabular, units_of
+from equimorph.tables import Table, Tabular, html_table, units_of
 from equimorph.tolerances import IN_BOX
 
 

@@ -11,7 +11,6 @@ from equimorph.argument_checks import check_arguments
 from equimorph.array_types import Bool, Float, Int
 from equimorph.equilibria.natural_sheet import NaturalSheet, natural_sheet
 from equimorph.errors import InputError
-from equimorph.html_tables import html_table
 from equimorph.model import (
     Constraint,
     Grid,
@@ -24,7 +23,7 @@ from equimorph.model import (
     position,
 )
 from equimorph.structures import State, States, Structure
-from equimorph.tables import Table, Tabular, units_of
+from equimorph.tables import Table, Tabular, html_table, units_of
 from equimorph.tasks.maps.causes import Paths
 from equimorph.tasks.maps.curves import (
     MapCurve,

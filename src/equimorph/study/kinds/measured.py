@@ -1,4 +1,4 @@
-"""Calibration: ``[[calibration]]``."""
+"""Shapes: ``[[shape]]`` of descriptors; ``[[estimate]]``, ``[[calibration]]`` of measurements."""
 
 from collections.abc import Mapping, Sequence
 from copy import deepcopy
@@ -18,7 +18,13 @@ from equimorph.manifold import EquilibriumSet
 from equimorph.model import parameter_vector
 from equimorph.structures import States, Structure, from_identity
 from equimorph.study import html
-from equimorph.study.answers import count_of
+from equimorph.study.answers import (
+    count_of,
+    figures_of_states,
+    free_columns,
+    place_of,
+    table_of_states,
+)
 from equimorph.study.data_files import DataFile, Measured, measured_shapes
 from equimorph.study.fields import Point, Positive
 from equimorph.study.lookup import at_key
@@ -28,6 +34,84 @@ from equimorph.tasks.calibration.calibrate import Calibration, calibrate
 from equimorph.tasks.calibration.measurements import MeasuredShape
 from equimorph.tasks.calibration.unknowns import Family
 from equimorph.tasks.calibration.unknowns import Kind as UnknownKind
+from equimorph.tasks.estimation import StateEstimate, estimate_state
+from equimorph.tasks.shapes.solutions import Shapes, solve_shape
+
+
+class ShapeKind(Kind[Shapes]):
+    """All settings at which the structure takes a shape."""
+
+    table = "shape"
+    tasks = (solve_shape,)
+
+    def figures(
+        self, question: Question, eset: EquilibriumSet | None, answer: Shapes
+    ) -> list[Figure]:
+        """Where they lie."""
+        return figures_of_states(question, eset, answer.states)
+
+    def words(self, question: Question, answer: Shapes) -> str:
+        """How many there are."""
+        stable, fitted = len(answer.stable), "" if answer.solved else f" {answer.why}"
+        states = f"{len(answer)} states, {stable} of them stable"
+        if len(answer) == 1:
+            states = f"1 {'stable' if stable else 'unstable'} state"
+        return f"**{answer.status}** by {states}.{fitted}"
+
+    def details(self, question: Question, answer: Shapes) -> list[str]:
+        """A table of them, with the way to each."""
+        if not len(answer):
+            return []
+        shown = list(question["targets"])
+        more = free_columns(answer.states, question.free, shown)
+        if answer.routes:
+            more["route"] = [
+                f"length {html.number(route.length)}" if route.arrived else route.why
+                for route in answer.routes
+            ]
+        return table_of_states(answer.states, shown, more)
+
+    def refusal(self, question: Question, answer: Shapes) -> str:
+        """Reason why there is none."""
+        del question
+        return "" if len(answer) else answer.why
+
+
+class EstimateKind(Kind[StateEstimate]):
+    """On which branch, and under which load, a measured structure is."""
+
+    table = "estimate"
+    tasks = (estimate_state,)
+
+    def look_up_more(self, question: Question) -> None:
+        """Every measured value needs its error."""
+        section = question.section
+        if set(section.measured) != set(section.errors):
+            raise InputError(
+                f"`{question.key}.errors` must give the standard error of each value of `measured` "
+                f"({', '.join(section.measured)}); got {', '.join(section.errors)}."
+            )
+
+    def figures(
+        self, question: Question, eset: EquilibriumSet | None, answer: StateEstimate
+    ) -> list[Figure]:
+        """Where the candidates lie."""
+        return figures_of_states(question, eset, answer.states)
+
+    def words(self, question: Question, answer: StateEstimate) -> str:
+        """Name the best candidate."""
+        where, weight = place_of(answer.state, question.free), html.number(answer.weight[0])
+        return f"**{answer.status}**: {where} with weight {weight}. {answer.why}".rstrip()
+
+    def details(self, question: Question, answer: StateEstimate) -> list[str]:
+        """A table of the candidates."""
+        shown = list(question["measured"])
+        more = free_columns(answer.states, question.free, shown)
+        for free, error in answer.standard_errors.items():
+            more[f"± {free}"] = [html.number(value, 2) for value in error]
+        more["χ²"] = [html.number(value) for value in answer.chi2]
+        more["weight"] = [html.number(value) for value in answer.weight]
+        return table_of_states(answer.states, shown, more) if len(answer.states) else []
 
 
 @dataclass(frozen=True)
