@@ -16,9 +16,9 @@ from equimorph.structures import Bar, Member, SpatialMember, Unknown
 from equimorph.study.extent import PointSection, SetSection
 from equimorph.study.fields import Section
 from equimorph.study.kinds import KINDS
+from equimorph.study.lookup import RuleSection
 from equimorph.study.problem import STUDY
 from equimorph.study.reference import meanings, meanings_of_kind, meanings_of_set
-from equimorph.study.rules import RuleSection
 from equimorph.study.states import NaturalSection, StateSection
 from equimorph.study.structures import (
     BarSection,
