@@ -43,7 +43,7 @@ def main(intervals: tuple[int, int] = (25, 25)) -> Result:
     back = em.lift(frame.natural_state(), {"P": 25.0}, through_folds=True)
     down = em.lift(back.end.state, {"P": -12.0}, through_folds=True)
     box = em.Box(k=(-1.0, 2.5), P=(-5.0, 22.0))
-    eset = em.equilibrium_set(frame, box, within=[frame.max_curvature <= 12], intervals=intervals)
+    eset = em.equilibrium_set(frame, box, within=[frame.max_curvature <= 6], intervals=intervals)
     height = frame.displacement("C", "y")
     stable = eset.at(k=0.0, P=10.0).stable
     route = em.plan(eset, max(stable, key=height), min(stable, key=height), margin=0.2)

@@ -1,5 +1,6 @@
 """Cells that are hard to decide: thin wedges behind cusps, tongues along constraints."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -27,9 +28,13 @@ CASES = [
 
 @pytest.mark.parametrize(("q", "cap"), CASES)
 def test_left_half_load_runs_clean(q, cap):
-    """Loads from 0, where the rod is symmetric, to 12; caps of max |κ| from 10 to 80."""
+    """Loads from 0, where the rod is symmetric, to 12; caps of max |κ| from 10 to 80.
+
+    Six elements do not resolve all states with max |κ| above 20: what is left out is named.
+    """
     eset = arch_set(load="left-half", q=q, cap=cap, checks=1)
-    assert eset.audit.clean, eset.audit
+    assert replace(eset.audit, left_out=0).clean, eset.audit
+    assert cap > 20.0 or eset.audit.clean
     assert eset.crossings == ()
 
 
@@ -152,7 +157,8 @@ def test_what_the_discretisation_does_not_resolve_is_told_to_be_left_out():
         audits.append(eset.audit)
         most.append(int(eset.at(Theta=0.82, Delta=0.0).index.max()))
     assert most == [6, 12, 6]
-    assert audits[0].left_out > 0
+    assert audits[0].faults == {"left_out": audits[0].left_out}
+    assert not audits[0].clean
     assert "left out" in dict(audits[0].rows())["not resolved"]
     assert audits[2].left_out == audits[2].unresolved == 0
     assert "not resolved" not in dict(audits[2].rows())

@@ -43,8 +43,8 @@ class Audit:
     which they touch, like the tip of a cone, or are nearer than states can be told apart.
 
     Vertices that the discretisation does not resolve (`unresolved`) belong to a set where curves
-    lead to them; the searches found `left_out` others, which it lacks: of what is not resolved sets
-    are never known to be complete, clean or not.
+    lead to them; the searches found `left_out` others, which it lacks, and which must be zero, too:
+    a finer discretisation finds them, or a constraint excludes them.
 
     `stopped`, which must be zero, is the number of equilibria at which lifting stopped because it
     exceeded the limit; much is unpaired and undecided then.
@@ -98,7 +98,6 @@ class Audit:
         faults = ", ".join(f"{name} {count}" for name, count in self.faults.items())
         large = f"largest residual {self.largest_residual:.1e}"
         state = "clean" if self.clean else f"NOT clean: {faults or large}"
-        state += f", {self.left_out} states not resolved are left out" if self.left_out else ""
         return f"Audit({state}; {self.vertices} equilibria, {self.cells} cells)"
 
     def _repr_html_(self) -> str:
@@ -121,10 +120,7 @@ class Audit:
 
     @property
     def clean(self) -> bool:
-        """Whether there are no `faults`, and residuals are at round-off.
-
-        A clean set may lack states that the discretisation does not resolve; see `left_out`.
-        """
+        """Whether there are no `faults`, and residuals are at round-off."""
         return not self.faults and self.largest_residual < SMALL_RESIDUAL
 
     @property
@@ -142,6 +138,7 @@ class Audit:
             "unrefined",
             "changed",
             "stopped",
+            "left_out",
         )
         counts = {name: getattr(self, name) for name in names} | {"touching": len(self.touching)}
         return {name: count for name, count in counts.items() if count}

@@ -119,8 +119,6 @@ class EquilibriumSet(Tabular):
     def __repr__(self) -> str:
         """Box, size and whether the audit is clean."""
         state = "clean" if self.audit.clean else "NOT clean"
-        lacking = f", {self.audit.left_out} states not resolved are left out"
-        state += lacking if self.audit.left_out else ""
         return f"EquilibriumSet({self.box}: {len(self.cells)} cells; audit {state})"
 
     def _repr_html_(self) -> str:

@@ -96,7 +96,9 @@ def _missing(eset: EquilibriumSet, places: list[dict[str, float]], seed: int) ->
     dropped = [each.unresolved for each in searched if each.unresolved is not None]
     dropped += [_within(pools, *each) for each in pools.unresolved]
     dropped.append(scattered[np.flatnonzero(~resolved)])
-    left_out = _lacking(join_states(structure, dropped), eset) if structure.is_discretised else ()
+    coarse = join_states(structure, dropped)
+    coarse = coarse[np.flatnonzero(are_feasible(eset.constraints, coarse.z, coarse.p))]
+    left_out = _lacking(coarse, eset) if structure.is_discretised else ()
     return Check(len(found), lacking, led.outcomes, len(met), len(left_out))
 
 
