@@ -14,7 +14,9 @@ run: $(INSTALLED)
 paper: $(INSTALLED)
 	$(BIN)/equimorph paper
 
+# First all kernels, each once, on all cores: two workers would compile most of them twice.
 test: $(INSTALLED)
+	$(BIN)/python -m equimorph.linalg.compile_ahead
 	$(QUIET_THREADS) $(BIN)/python -m pytest -n 2 --dist worksteal -m "not slow"
 
 # `make test-slow TENTH=3` runs a tenth of them; TENTH is any number, its last digit counts. They

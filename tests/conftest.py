@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 from hypothesis import settings
+from numba.core.dispatcher import Dispatcher
 
 # a test that is right stays right on a busy machine, and says the same each time
 settings.register_profile("equimorph", deadline=None, derandomize=True)
@@ -70,6 +71,33 @@ def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:
     nothing = exitstatus == pytest.ExitCode.NO_TESTS_COLLECTED
     if nothing and session.config.getoption("tenth") is not None:
         session.exitstatus = pytest.ExitCode.OK
+
+
+MADE = set()
+"""Calls of kernels by the package whose code this process did not have yet."""
+COMPILE = Dispatcher._compile_for_args
+
+
+def _note_and_compile(self: Dispatcher, *args: object) -> object:
+    if sys._getframe(1).f_globals["__name__"].partition(".")[0] == "equimorph":
+        MADE.add((self, tuple(self.typeof_pyval(each) for each in args)))
+    return COMPILE(self, *args)
+
+
+Dispatcher._compile_for_args = _note_and_compile
+
+
+@pytest.fixture(autouse=True)
+def _calls_of_kernels_are_listed() -> Generator[None]:
+    """What `compile_ahead` does not know would be compiled while someone waits."""
+    yield
+    if MADE:
+        from equimorph.linalg.compile_ahead import known_calls  # noqa: PLC0415  # after the hook
+
+        known = {(each.name, each.types) for each in known_calls()}
+        new = {(f"{of.py_func.__module__}.{of.py_func.__name__}", types) for of, types in MADE}
+        MADE.clear()
+        assert new <= known, "write the list with benchmarks/list_kernel_calls.py"
 
 
 @pytest.fixture(scope="session")

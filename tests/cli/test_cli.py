@@ -406,7 +406,7 @@ def test_an_interrupted_run_says_how_to_go_on(known: Shell, monkeypatch: pytest.
     assert "read from an earlier run" in known.out
 
 
-@pytest.mark.parametrize("where", ["compile_kernels", "read_problem"])
+@pytest.mark.parametrize("where", ["compile_ahead", "read_problem"])
 def test_a_run_interrupted_before_it_begins_says_what_is_kept(
     shell: Shell, monkeypatch: pytest.MonkeyPatch, where: str
 ):
@@ -416,11 +416,11 @@ def test_a_run_interrupted_before_it_begins_says_what_is_kept(
         raise KeyboardInterrupt
 
     Path("spring.toml").write_text(SPRING)
-    monkeypatch.setattr("equimorph.cli.run.kernels_are_in_cache", lambda: False)
+    monkeypatch.setattr("equimorph.linalg.compile_ahead.KernelCall.is_kept", False)
     monkeypatch.setattr(f"equimorph.cli.run.{where}", interrupt)
     assert shell("run", "spring.toml", "--out", "out") == 130
     kept = "kernels that are compiled are kept; the study had not begun"
-    kept = kept if where == "compile_kernels" else "what is finished is kept in out"
+    kept = kept if where == "compile_ahead" else "what is finished is kept in out"
     assert _says_one_line(shell, f"interrupted; {kept}. Run again to go on.")
 
 

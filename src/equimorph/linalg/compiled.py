@@ -21,6 +21,7 @@ from typing import Any
 import numba
 from numba import types
 from numba.core.caching import FunctionCache, IndexDataCacheFile
+from numba.core.compiler_lock import global_compiler_lock
 
 _HERE = Path(__file__).resolve()
 _ROOT = _HERE.parents[2]
@@ -44,6 +45,7 @@ def njit(**options: Any) -> Callable[[Any], Any]:
     def compiled(function: Any) -> Any:
         dispatcher = numba.njit(**options)(function)
         dispatcher._cache = _KernelCache(function)
+        dispatcher.compile = _alone(dispatcher)
         # of a literal number the compiler would make another copy of the kernel
         resolve = dispatcher.get_call_template
         dispatcher.get_call_template = lambda args, names: resolve(
@@ -54,15 +56,46 @@ def njit(**options: Any) -> Callable[[Any], Any]:
     return compiled
 
 
-def is_kept(kernel: Any) -> bool:
-    """Whether compiled code of a kernel is on disk, made from the present sources.
+def _alone(dispatcher: Any) -> Callable[[Any], Any]:
+    """Compiling a kernel and keeping its code, or reading it, while no other process does.
+
+    Who waits here compiles callers of the kernel: processes never wait for each other in a circle.
+    """
+    compile_here, overloads = dispatcher.compile, dispatcher.overloads
+
+    def compile_alone(signature: Any) -> Any:
+        if signature in overloads:
+            return compile_here(signature)
+        with global_compiler_lock, dispatcher._cache.lock(wait=True):
+            return compile_here(signature)
+
+    return compile_alone
+
+
+def kept_signatures(kernel: Any) -> list[Any]:
+    """Types of arguments for which code made from the present sources is on disk.
 
     Parameters
     ----------
     kernel
         A function that `njit` of this module returned.
     """
-    return bool(kernel._cache.has_code())
+    return [key[0] for key in kernel._cache._cache_file._load_index()]
+
+
+def is_being_compiled(kernel: Any) -> bool:
+    """Whether another process compiles a kernel at this moment.
+
+    Parameters
+    ----------
+    kernel
+        A function that `njit` of this module returned.
+    """
+    try:
+        with kernel._cache.lock(wait=False):
+            return False
+    except BlockingIOError:
+        return True
 
 
 def sources(path: Path) -> set[Path]:
@@ -108,23 +141,18 @@ class _KernelCache(FunctionCache):
     def __init__(self, function: Any) -> None:
         super().__init__(function)
         stamp = digest(Path(function.__code__.co_filename))
-        self._cache_file = _LockedFiles(self.cache_path, self._impl.filename_base, stamp)
+        self._cache_file = _KernelFiles(self.cache_path, self._impl.filename_base, stamp)
 
-    def has_code(self) -> bool:
-        """Whether there is code for any types."""
-        return bool(self._cache_file._load_index())
+    @contextmanager
+    def lock(self, *, wait: bool) -> Iterator[None]:
+        """Keep other processes from this kernel; a BlockingIOError if one has it and none waits."""
+        with Path(self.cache_path, f"{self._impl.filename_base}.lock").open("w") as handle:
+            fcntl.flock(handle, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
+            yield
 
 
-class _LockedFiles(IndexDataCacheFile):
-    """Index and data of one kernel, for one process at a time."""
-
-    def load(self, key: Any) -> Any:
-        with self._lock():
-            return super().load(key)
-
-    def save(self, key: Any, data: Any) -> None:
-        with self._lock():
-            super().save(key, data)
+class _KernelFiles(IndexDataCacheFile):
+    """Index and data of one kernel."""
 
     def _load_index(self) -> Any:
         """Return the index; an empty one if the file is damaged, so that all is compiled anew."""
@@ -144,9 +172,3 @@ class _LockedFiles(IndexDataCacheFile):
         content = self._dump(data)
         with self._open_for_write(self._data_path(name)) as file:
             file.write(hashlib.sha256(content).digest() + content)
-
-    @contextmanager
-    def _lock(self) -> Iterator[None]:
-        with Path(self._cache_path, "kernels.lock").open("w") as handle:
-            fcntl.flock(handle, fcntl.LOCK_EX)
-            yield

@@ -56,11 +56,11 @@ def set_threads(count: int | None = None) -> None:
     >>> em.set_threads(1)  # one process for each processor, as in a pool of processes
     >>> em.set_threads()
     """
-    _number.chosen = _default() if count is None else count
+    _number.chosen = cores() if count is None else count
 
 
-def _default() -> int:
-    """Number of threads by the environment, or that of processors."""
+def cores() -> int:
+    """Processors to compute on: as many as the environment says, or all."""
     text = os.environ.get(VARIABLE, "").strip()
     if text:
         if not text.isdecimal() or int(text) < 1:
@@ -74,7 +74,7 @@ class _Number:
 
     @cached_property
     def chosen(self) -> int:
-        return _default()
+        return cores()
 
 
 _number = _Number()

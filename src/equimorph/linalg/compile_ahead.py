@@ -1,0 +1,158 @@
+"""Kernels compiled before they are called, each once, by as many processes as there are cores.
+
+`kernel_calls.txt` lists the calls of kernels from Python, those that take longest to compile first:
+name of the kernel, types of its arguments, and a mark of calls that every study makes. What kernels
+call is compiled with them. ``python -m equimorph.linalg.compile_ahead`` compiles all of them.
+"""
+
+import gc
+import sys
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from importlib import import_module
+from inspect import isfunction, ismethod, ismodule
+from pathlib import Path
+from subprocess import DEVNULL, Popen
+from typing import Any
+
+from numba.core.dispatcher import Dispatcher
+from numba.core.sigutils import normalize_signature
+
+from equimorph.linalg.compiled import is_being_compiled, kept_signatures
+from equimorph.linalg.lanes import cores
+
+LIST = Path(__file__).with_name("kernel_calls.txt")
+PACKAGE = __name__.partition(".")[0]
+
+
+@dataclass(frozen=True)
+class KernelCall:
+    """A call of a kernel from Python."""
+
+    number: int
+    """Its line in the list."""
+    name: str
+    """Of the kernel, with its module."""
+    arguments: str
+    """Their types, as numba reads them."""
+    is_common: bool
+    """Whether every study makes it."""
+
+    @cached_property
+    def kernel(self) -> Any:
+        """The compiled function."""
+        module, _, name = self.name.rpartition(".")
+        return getattr(import_module(module), name)
+
+    @cached_property
+    def types(self) -> tuple[Any, ...]:
+        """Types of the arguments."""
+        return tuple(normalize_signature(self.arguments)[0])
+
+    @property
+    def is_kept(self) -> bool:
+        """Whether its code is on disk."""
+        return self.types in kept_signatures(self.kernel)
+
+
+def known_calls() -> list[KernelCall]:
+    """Every call of a kernel from Python, in the order in which they are compiled."""
+    rows = [line.split("\t") for line in LIST.read_text().splitlines()]
+    return [KernelCall(number, *row[:2], bool(row[2])) for number, row in enumerate(rows)]
+
+
+def calls_of(root: object) -> list[KernelCall]:
+    """Calls that every study makes, and those of the kernels that an object's parts use.
+
+    Parameters
+    ----------
+    root
+        Any object: the modules that its attributes come from tell.
+    """
+    kernels = {
+        f"{each.py_func.__module__}.{each.py_func.__name__}"
+        for name in {_module(each) for each in _parts(root)}
+        for each in _members(sys.modules[name])
+        if isinstance(each, Dispatcher)
+    }
+    return [each for each in known_calls() if each.is_common or each.name in kernels]
+
+
+def _members(module: object) -> Iterator[object]:
+    for each in vars(module).values():
+        if ismodule(each) and each.__name__.endswith("kernels"):
+            yield from vars(each).values()
+        yield each
+
+
+def _module(thing: object) -> str:
+    return getattr(thing, "__module__", None) or ""
+
+
+def _parts(root: object) -> Iterator[object]:
+    """Classes and functions of ours that an object and its attributes are made of."""
+    seen: dict[int, object] = {}
+    open_ends = [root]
+    while open_ends:
+        each = open_ends.pop()
+        if id(each) in seen:
+            continue
+        seen[id(each)] = each
+        if isinstance(each, list | tuple):
+            open_ends += each
+        elif isinstance(each, dict):
+            open_ends += each.values()
+        elif ismethod(each):
+            open_ends += [each.__self__, each.__func__]
+        elif _module(each).startswith(PACKAGE):
+            yield from (kind for kind in type(each).__mro__ if _module(kind).startswith(PACKAGE))
+            open_ends += vars(each).values() if hasattr(each, "__dict__") else []
+            if isfunction(each):
+                yield each
+                open_ends += [cell.cell_contents for cell in each.__closure__ or ()]
+
+
+def compile_ahead(calls: Iterable[KernelCall]) -> None:
+    """Compile what is not on disk; processes that do so at the same time share the work.
+
+    Parameters
+    ----------
+    calls
+        Those to be made later.
+    """
+    missing = [each for each in calls if not each.is_kept]
+    command = [sys.executable, "-m", __name__ if __name__ != "__main__" else __spec__.name]
+    command += [str(each.number) for each in missing]
+    helpers = [
+        Popen(command, stdout=DEVNULL, stderr=DEVNULL)
+        for _ in range(min(cores(), len(missing)) - 1)
+    ]
+    try:
+        _share(missing)
+        for each in missing:  # what a helper has not finished, or failed to do
+            each.kernel.compile(each.types)
+    finally:
+        for helper in helpers:
+            helper.terminate()
+            helper.wait()
+
+
+def _share(calls: Iterable[KernelCall]) -> None:
+    for each in calls:
+        if not each.is_kept and not is_being_compiled(each.kernel):
+            each.kernel.compile(each.types)
+
+
+def main() -> None:
+    """Compile all calls, or, as a helper, a share of those whose numbers are given."""
+    known = known_calls()
+    if numbers := sys.argv[1:]:
+        gc.disable()  # compiling makes many objects that live on; this process ends soon
+        _share([known[int(each)] for each in numbers])
+    else:
+        compile_ahead(known)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,87 @@
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import equimorph as em
+from equimorph.linalg import compile_ahead as ahead
+from equimorph.linalg.compiled import kept_signatures
+from equimorph.study import read_problem
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+SOURCE = """
+from equimorph.linalg.compiled import njit
+
+@njit(nogil=True)
+def twice(x):
+    return inner(x) + x
+
+@njit(nogil=True)
+def inner(x):
+    return x
+"""
+OTHER = """
+from numpy import ones
+from {name} import twice
+print(twice(ones(2)).sum(), twice.stats.cache_hits)
+"""
+
+
+def _names(calls: list[ahead.KernelCall]) -> set[str]:
+    return {each.name.removeprefix("equimorph.structures.") for each in calls}
+
+
+def test_every_line_of_the_list_names_a_kernel_and_types():
+    """Calls that are not listed fail the test that makes them: see tests/conftest.py."""
+    for call in ahead.known_calls():
+        assert call.kernel.py_func.__module__ == call.name.rpartition(".")[0]
+        assert len(call.types) == call.kernel.py_func.__code__.co_argcount
+
+
+@pytest.mark.parametrize(
+    ("study", "wanted", "unwanted"),
+    [
+        ("arch", "rod.clamped_kernels.advance_lanes", "rod.general_kernels.linearise_lanes"),
+        ("beam", "rod.general_kernels.linearise_lanes", "rod.clamped_kernels.advance_lanes"),
+        ("truss", "truss.kernels.linearise_lanes", "frame.kernels.linearise_lanes"),
+        ("lee", "frame.kernels.linearise_lanes", "truss.kernels.linearise_lanes"),
+        ("sideways", "spatial.step_kernels.advance_lanes", "rod.clamped_kernels.advance_lanes"),
+    ],
+)
+def test_a_study_compiles_what_its_structure_needs(study: str, wanted: str, unwanted: str):
+    _, _, problem = read_problem(EXAMPLES / f"{study}.toml")
+    names = _names(ahead.calls_of(problem))
+    assert wanted in names
+    assert unwanted not in names
+    assert _names(ahead.calls_of(em.Spring())) < names
+
+
+@pytest.fixture
+def source(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+    """Name of a module of two kernels that were never compiled."""
+    name = f"kernels_of_{tmp_path.name}"
+    (tmp_path / f"{name}.py").write_text(SOURCE)
+    monkeypatch.syspath_prepend(tmp_path)
+    return name
+
+
+def test_calls_are_compiled_with_what_they_call(source: str, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(ahead, "cores", lambda: 1)
+    call = ahead.KernelCall(0, f"{source}.twice", "(float64[::1],)", is_common=False)
+    assert not call.is_kept
+    ahead.compile_ahead([call])
+    assert call.is_kept
+    assert kept_signatures(sys.modules[source].inner) == [call.types]
+    np.testing.assert_array_equal(call.kernel(np.ones(2)), [2, 2])
+    assert not call.kernel.stats.cache_hits
+
+
+def test_of_processes_that_need_a_kernel_one_compiles_it(source: str, tmp_path: Path):
+    command = [sys.executable, "-c", OTHER.format(name=source)]
+    others = [
+        subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, text=True) for _ in range(2)
+    ]
+    told = sorted(other.communicate()[0].split(maxsplit=1)[1] for other in others)
+    assert told == ["Counter()\n", "Counter({(Array(float64, 1, 'C', False, aligned=True),): 1})\n"]
