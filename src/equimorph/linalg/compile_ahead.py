@@ -59,7 +59,10 @@ class KernelCall:
 def known_calls() -> list[KernelCall]:
     """Every call of a kernel from Python, in the order in which they are compiled."""
     rows = [line.split("\t") for line in LIST.read_text().splitlines()]
-    return [KernelCall(number, *row[:2], bool(row[2])) for number, row in enumerate(rows)]
+    return [
+        KernelCall(number, name, arguments, is_common=bool(mark))
+        for number, (name, arguments, mark) in enumerate(rows)
+    ]
 
 
 def calls_of(root: object) -> list[KernelCall]:
