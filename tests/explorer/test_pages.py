@@ -12,8 +12,7 @@ import pytest
 
 import equimorph as em
 from equimorph.explorer.contents import curved_edges, study_text, toml
-from equimorph.explorer.packing import json_in_html, pack, quantise
-from equimorph.explorer.pictures import FIDELITY, gallery
+from equimorph.explorer.pictures import FIDELITY, gallery, json_in_html, pack, quantise
 from equimorph.manifold import edge_middles
 from equimorph.study.problem import parse_study
 from oracles.specimens import SPECIMENS

@@ -7,7 +7,7 @@ import pytest
 
 import equimorph as em
 from equimorph.equilibria import settle
-from equimorph.paper import curvatures, limit_loads
+from equimorph.paper import arch_maps
 from equimorph.tasks.maps.curvature import FirstStablePaths
 from typecheck import unchecked
 
@@ -27,16 +27,16 @@ BESIDE_GAPS = 5e-4
 @cache
 def load_map(load, full):
     rod = em.Rod(load)
-    grid = em.Grid(**(limit_loads.GRID if full else COARSE))
+    grid = em.Grid(**(arch_maps.GRID if full else COARSE))
     with unchecked():
         return em.limit_load_map(rod, grid, "q", within=[rod.max_curvature <= 10])
 
 
 @cache
 def curvature_map(load, full):
-    grid = em.Grid(**(curvatures.GRID if full else COARSER))
+    grid = em.Grid(**(arch_maps.GRID if full else COARSER))
     with unchecked():
-        return em.curvature_map(em.Rod(load), grid, "q", curvatures.LOAD)
+        return em.curvature_map(em.Rod(load), grid, "q", arch_maps.LOAD)
 
 
 def settings_of(amap, count):

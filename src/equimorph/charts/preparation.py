@@ -7,7 +7,7 @@ import numpy as np
 from equimorph.array_types import Bool, Float, Int
 from equimorph.arrays import Facets, ItemFlags, Items, Pairs, VertexNumbers
 from equimorph.manifold import EquilibriumSet
-from equimorph.manifold.complex.kept_tables import kept
+from equimorph.manifold.complex.kept_sets import kept
 from equimorph.manifold.complex.marked_complex import Fabric, fabric_of
 from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.simplices import volumes

@@ -17,8 +17,7 @@ from equimorph.array_types import Int, Num
 from equimorph.arrays import Values
 from equimorph.charts import Reduction
 from equimorph.errors import InputError
-from equimorph.explorer.packing import quantise
-from equimorph.explorer.pictures import FIDELITY, gallery, size_of
+from equimorph.explorer.pictures import FIDELITY, gallery, quantise, size_of
 from equimorph.manifold import (
     EdgeMiddles,
     EquilibriumSet,

@@ -12,7 +12,7 @@ from equimorph.argument_checks import check_arguments
 from equimorph.charts import Reduction
 from equimorph.errors import InputError
 from equimorph.explorer.contents import Question, contents
-from equimorph.explorer.packing import json_in_html, pack
+from equimorph.explorer.pictures import json_in_html, pack
 from equimorph.manifold import EquilibriumSet, SnapGraph, snap_graph
 from equimorph.model import Descriptor, Progress
 from equimorph.storage.files import write_text

@@ -4,19 +4,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from equimorph.paper import (
-    curvatures,
-    inside_out,
-    introduction,
-    limit_loads,
-    models,
-    parameterisations,
-    space_loads,
-    space_route,
-    space_stiffness,
-    spring,
-    tracking,
-)
+from equimorph.paper import arch_maps, in_space, shape_control
+from equimorph.paper.models import models
+from equimorph.paper.spring import spring
 
 
 @dataclass(frozen=True)
@@ -25,25 +15,28 @@ class Example:
 
     Parameters
     ----------
-    name, title
-        Of the module, and for people.
+    title
+        For people.
     main
         Draws the figures into a folder and returns the key numbers by name.
     captions
         Names of the figures without extension, and what stands below each.
     """
 
-    name: str
     title: str
     main: Callable[[Path], dict[str, float]]
     captions: dict[str, str]
 
+    @property
+    def name(self) -> str:
+        """That of the function."""
+        return self.main.__name__
+
 
 EXAMPLES = (
     Example(
-        "introduction",
         "Two states under one load; adaptation to a load",
-        introduction.main,
+        shape_control.introduction,
         {
             "two-states": "Two stable states of one rod of length L, clamped in rotary actuators "
             "sin 1 · L apart at Θ = 1, Δ = 0.1, under the same force F = 1 · 4π²B/L² at its "
@@ -55,9 +48,8 @@ EXAMPLES = (
         },
     ),
     Example(
-        "parameterisations",
         "Internal parameterisations",
-        parameterisations.main,
+        shape_control.parameterisations,
         {
             "parameterisations": "Equilibrium sets of the arch under the uniform load q = 2.5 "
             "(above; crown over both end angles, cut at max |κ| = 10, near a cusp of its folds) "
@@ -69,9 +61,8 @@ EXAMPLES = (
         },
     ),
     Example(
-        "models",
         "The two structures",
-        models.main,
+        models,
         {
             "spring-model": "A spring of stiffness k and natural length 1 from A to B. The "
             "actuator sets the distance x_l of A from the line on which B slides; the vertical "
@@ -82,9 +73,8 @@ EXAMPLES = (
         },
     ),
     Example(
-        "spring",
         "The constrained spring",
-        spring.main,
+        spring,
         {
             "spring-equilibria": "Angle δ of the spring's equilibria over the force F with the "
             "actuator at x_l = 0.80: stable states as full lines, unstable ones dashed, rings at "
@@ -100,9 +90,8 @@ EXAMPLES = (
         },
     ),
     Example(
-        "limit_loads",
         "Limit loads",
-        limit_loads.main,
+        arch_maps.limit_loads,
         {
             f"limit-loads-{load}": f"Largest {load} load over half the difference Θ and half the "
             f"sum Δ of the end angles, from the unloaded state until stability is lost (C1) or "
@@ -113,9 +102,8 @@ EXAMPLES = (
         },
     ),
     Example(
-        "curvatures",
         "Largest curvatures at q = 2.5",
-        curvatures.main,
+        arch_maps.curvatures,
         {
             f"curvatures-{load}": f"Largest curvature of the first stable state with q = 2.5 on "
             f"the path from rest under the {load} load, over half the difference Θ and half the "
@@ -126,9 +114,8 @@ EXAMPLES = (
         },
     ),
     Example(
-        "tracking",
         "A closed curve of heights, tracked",
-        tracking.main,
+        shape_control.tracking,
         {
             "tracking": "The arch under the uniform load q = 2.5 moves its heights at s = 1/3 and "
             "2/3 around a square (red, corners numbered). (a) Heights, with what can be reached "
@@ -138,9 +125,8 @@ EXAMPLES = (
         },
     ),
     Example(
-        "inside_out",
         "The arch turned inside out",
-        inside_out.main,
+        shape_control.inside_out,
         {
             "inside-out": "The arch under the uniform load q = 2.5 is turned inside out without a "
             "snap, along the article's way-points (red, 1 to 5). (a) The equilibrium set over both "
@@ -151,9 +137,8 @@ EXAMPLES = (
         },
     ),
     Example(
-        "space_loads",
         "In space: limit loads",
-        space_loads.main,
+        in_space.space_loads,
         {
             f"space-loads-{name}": f"Limit loads of the arch under the uniform load, {text}, in "
             "colours common to all five maps. Striped: the arch leaves its plane first; dotted: "
@@ -163,15 +148,14 @@ EXAMPLES = (
                 ("round", "made of a round rod (ν = 0.3)"),
                 *(
                     (f"strip-{ratio:g}", f"made of a strip {ratio:g} times as wide as thick")
-                    for ratio in space_loads.RATIOS
+                    for ratio in in_space.RATIOS
                 ),
             )
         },
     ),
     Example(
-        "space_route",
         "In space: the way inside out",
-        space_route.main,
+        in_space.space_route,
         {
             "space-route": "The article's way inside out at q = 2.5 in space: "
             "the lowest eigenvalue of the second variation out of the plane, left along "
@@ -180,9 +164,8 @@ EXAMPLES = (
         },
     ),
     Example(
-        "space_stiffness",
         "In space: how stiff is stiff enough",
-        space_stiffness.main,
+        in_space.space_stiffness,
         {
             "space-stiffness": "Smallest stiffness A out of the plane, relative to EI in it, with "
             "which the arch under the uniform load (C = GJ/EI = 0.77) stays in its plane from rest "

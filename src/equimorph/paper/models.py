@@ -16,7 +16,7 @@ COIL = 0.035 * np.array([0.0, 0.0, *np.tile([1.0, -1.0], 7), 0.0, 0.0])
 """Distances of the corners of the coil from its axis."""
 
 
-def main(folder: Path) -> dict[str, float]:
+def models(folder: Path) -> dict[str, float]:
     """Draw both structures; there is nothing to compute."""
     em.plotting.save(spring_model(), folder, "spring-model")
     em.plotting.save(rod_model(), folder, "rod-model")

@@ -15,7 +15,7 @@ SMOOTH = 1e-3
 """Distance of the surface from its triangles up to which lines on it look smooth at its cusp."""
 
 
-def main(folder: Path, accuracy: float = SMOOTH) -> dict[str, float]:
+def spring(folder: Path, accuracy: float = SMOOTH) -> dict[str, float]:
     """Answer the tasks of the article from C_s, at the load of C_s."""
     spring = em.Spring()
     angle, load, length = spring.angle, em.value_of(spring, "F"), em.value_of(spring, "x_l")

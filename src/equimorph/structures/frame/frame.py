@@ -14,14 +14,13 @@ from equimorph.arrays import Lanes, Parameters, Values, Velocity
 from equimorph.errors import InputError
 from equimorph.linalg.dense import multiply
 from equimorph.model import Descriptor, remember_call
+from equimorph.structures.any_network import edges_of_image, images, is_symmetry, parameter_exchange
 from equimorph.structures.contract import Symmetry
 from equimorph.structures.frame.any_model import Actuators, Loads
 from equimorph.structures.frame.fields import FrameFields, frame_material, member_masses
 from equimorph.structures.frame.mechanics import FrameMechanics
-from equimorph.structures.frame.member import AXES, MemberSpec, SupportSpec
 from equimorph.structures.frame.model import FrameModel
-from equimorph.structures.frame.network import frame_network
-from equimorph.structures.images import edges_of_image, images, is_symmetry, parameter_exchange
+from equimorph.structures.frame.network import AXES, MemberSpec, SupportSpec, frame_network
 from equimorph.structures.network import Joints
 from equimorph.structures.unit_system import Units, unit_system
 

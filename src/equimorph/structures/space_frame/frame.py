@@ -18,10 +18,9 @@ from equimorph.structures.network import Joints
 from equimorph.structures.newton import newton
 from equimorph.structures.space_frame.fields import SpatialFrameFields
 from equimorph.structures.space_frame.mechanics import SpatialFrameMechanics
-from equimorph.structures.space_frame.member import SpatialMemberSpec
+from equimorph.structures.space_frame.member import SpatialMemberSpec, SpatialSupportSpec
 from equimorph.structures.space_frame.model import SpatialFrameModel
 from equimorph.structures.space_frame.network import spatial_network
-from equimorph.structures.space_frame.supports import SpatialSupportSpec
 from equimorph.structures.unit_system import Units, unit_system
 
 

@@ -19,16 +19,14 @@ from equimorph.structures.network import (
 )
 from equimorph.structures.space_frame.member import (
     BALL,
-    SpatialMember,
-    SpatialMemberSpec,
-    Stiffness,
-)
-from equimorph.structures.space_frame.supports import (
     FREE,
     HELD,
     NO_SUPPORT,
+    SpatialMember,
+    SpatialMemberSpec,
     SpatialSupport,
     SpatialSupportSpec,
+    Stiffness,
     spatial_support,
 )
 from equimorph.structures.unit_system import UnitSystem

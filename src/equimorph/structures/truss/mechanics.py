@@ -12,14 +12,18 @@ from equimorph.linalg.intervals import Interval, product, square, symmetric
 from equimorph.linalg.sparse import SparseLayout
 from equimorph.model import Actuator, ActuatorKind, Drawing, Forces, Support
 from equimorph.model.drawing import supports_of_point
-from equimorph.structures.any_network import AnyNetwork
+from equimorph.structures.any_network import (
+    AnyNetwork,
+    edges_of_image,
+    images,
+    is_symmetry,
+    parameter_exchange,
+)
 from equimorph.structures.contract import Growth, Symmetry
 from equimorph.structures.discrete import along_corners, linearise
 from equimorph.structures.equations import Direction, Enclosed
-from equimorph.structures.images import edges_of_image, images, is_symmetry, parameter_exchange
-from equimorph.structures.truss.bar import Energies
 from equimorph.structures.truss.kernels import linearise_lanes
-from equimorph.structures.truss.network import TrussNetwork
+from equimorph.structures.truss.network import Energies, TrussNetwork
 from equimorph.structures.unit_system import UnitSystem
 
 BarValues = Float[np.ndarray, "lanes bars"]

@@ -18,9 +18,15 @@ from equimorph.structures.network import (
     check_parameter_names,
     direction_of_mechanism,
 )
-from equimorph.structures.truss.bar import BarSpec, Energies, Strain
 from equimorph.structures.truss.mechanics import COLLAPSED, BarValues, TrussMechanics, symmetries
-from equimorph.structures.truss.network import AXES, TrussNetwork, truss_network
+from equimorph.structures.truss.network import (
+    AXES,
+    BarSpec,
+    Energies,
+    Strain,
+    TrussNetwork,
+    truss_network,
+)
 from equimorph.structures.unit_system import Quantity, Units, unit_system
 from equimorph.tolerances import SINGULAR
 

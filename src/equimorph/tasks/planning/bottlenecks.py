@@ -15,7 +15,7 @@ from equimorph.array_types import Float
 from equimorph.arrays import ItemFlags, Items
 from equimorph.equilibria import settle
 from equimorph.manifold import EquilibriumSet
-from equimorph.manifold.complex.kept_tables import from_cache
+from equimorph.manifold.complex.kept_sets import from_cache
 from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.queries.nearest import SetPoints, points_at_vertices
 from equimorph.model import Constraint

@@ -20,10 +20,11 @@ from equimorph.tasks.distances import distinct
 from equimorph.tasks.optimising.programme import stability
 from equimorph.tasks.planning.planner import plan
 from equimorph.tasks.route import Route
-from equimorph.tasks.shapes.fits_and_families import best_fits, solution_family
 from equimorph.tasks.shapes.prediction import (
     Predictor,
+    best_fits,
     predictor,
+    solution_family,
     states_with_values,
     twin_guesses,
 )

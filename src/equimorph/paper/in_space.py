@@ -1,0 +1,155 @@
+"""The article's arch in space: limit loads, the way inside out, how stiff is stiff enough."""
+
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+from scipy.optimize import brentq
+
+import equimorph as em
+
+GRID = {"Theta": (0.3, 1.6, 40), "Delta": (-1.2, 1.2, 40)}
+RATIOS = (1.25, 1.5, 3.0)
+"""Widths of the strips by their thicknesses."""
+POISSON = 0.3
+"""Poisson's ratio of all sections."""
+SETTINGS = ((0.6, 0.0), (0.9, 0.0), (0.9, 0.02), (1.2, 0.0), (1.5, 0.0), (0.94, 0.6))
+"""Supports (Θ, Δ) in rad at which the load is quoted at which a round rod leaves its plane."""
+
+
+def space_loads(folder: Path, grid: em.Grid | None = None) -> dict[str, float]:
+    """Compute the maps, the first lateral loads of the round rod, and what the strips need."""
+    grid = grid or em.Grid(**GRID)
+    rods = {"planar": em.Rod(), "round": em.Rod(torsion=1 / (1 + POISSON), lateral=1.0)}
+    rods |= {f"strip {ratio:g}": em.Rod(**strip(ratio)) for ratio in RATIOS}
+    numbers: dict[str, float] = {}
+    highest = 0.0
+    for name, rod in rods.items():
+        within = [rod.max_curvature <= 10]
+        within += [] if name == "planar" else [rod.stable_in_space]
+        loads = em.limit_load_map(rod, grid, "q", within=within)
+        largest = float(np.nanmax(loads.value))
+        highest = highest or largest  # all maps have the colours of the first
+        ax = em.plotting.load_map(loads, highest=highest)
+        em.plotting.save(ax, folder, f"space-loads-{name.replace(' ', '-')}")
+        numbers[f"{name}: largest limit load on the grid"] = largest
+        sideways = loads.counts["lateral branch point"]
+        defined = sum(loads.counts.values()) - loads.counts["undefined unloaded"]
+        numbers[f"{name}: share of settings that leave the plane first"] = sideways / defined
+    for load in ("uniform", "left-half"):
+        rod = em.Rod(load, torsion=1 / (1 + POISSON), lateral=1.0)
+        for theta, delta in SETTINGS:
+            rest = rod.natural_state(Theta=theta, Delta=delta)
+            found = em.limit_load(rest, "q", within=[rod.stable_in_space])
+            numbers[f"round, {load}: leaves its plane at ({theta:g}, {delta:g})"] = found.value
+            if (load, theta, delta) == ("uniform", 0.9, 0.0):
+                numbers["round: snaps out of its plane at (0.9, 0)"] = (
+                    found.criticality != "supercritical"
+                )
+    return numbers
+
+
+ARCH = em.Rod()
+WAY = [{"Theta": 1.3}, {"Delta": 1.3}, {"Theta": 1.0}, {"Delta": 0.0}]
+LOAD = 2.5
+"""Uniform load q on the way inside out."""
+ROUTE_RATIOS = (2.0, 10**0.5, 10.0, 40.0)
+"""Widths of strips by their thicknesses."""
+SECTIONS = {
+    "round": {"torsion": 0.77, "lateral": 1.0},
+    "A = 2, C = 0.9": {"torsion": 0.9, "lateral": 2.0},
+}
+"""Further stiffnesses GJ = C EI and A EI out of the plane."""
+COLOURS = ("#d1004b", "#e8902a", "#90b4d6", "#417aac", "#1d3f66")
+
+
+def space_route(folder: Path, widths: int = 60) -> dict[str, float]:
+    """Judge every state of the way for all sections."""
+    path = way_inside_out()
+    strips = {f"{ratio:.3g} : 1": strip(ratio) for ratio in ROUTE_RATIOS}
+    found = {
+        name: lateral_margins(path.states, **stiff) for name, stiff in (SECTIONS | strips).items()
+    }
+    ratios = np.geomspace(1.0, 40.0, widths)
+    least = [lateral_margins(path.states, **strip(ratio)).min() for ratio in ratios]
+    panels = Figure(figsize=(7.2, 2.6))
+    with em.plotting.house_style():
+        along, over = panels.subplots(1, 2)
+        panels.subplots_adjust(left=0.09, right=0.98, bottom=0.17, top=0.96, wspace=0.35)
+        for name, colour in zip(("round", *strips), COLOURS, strict=True):
+            share = path.length / path.length[-1]
+            along.plot(share, found[name], color=colour, linewidth=1.3, label=name)
+        over.semilogx(ratios, least, color="#1a1a1a", linewidth=1.3)
+        for ax in (along, over):
+            ax.axhline(0.0, color="#8c8c8c", linewidth=0.6)
+        along.set(xlabel="progress along the way", ylabel="lowest lateral eigenvalue")
+        over.set(xlabel="width/thickness", ylabel="smallest on the way", xlim=(1.0, 40.0))
+        over.set_xticks([1, 2, 5, 10, 20, 40], ["1", "2", "5", "10", "20", "40"])
+        over.minorticks_off()
+        along.legend(title="section", ncols=2)
+        em.plotting.save(panels, folder, "space-route")
+    numbers = {f"{name}: smallest on the way": float(each.min()) for name, each in found.items()}
+    numbers["round: stable in space all along"] = bool(found["round"].min() > 0.0)
+    return numbers
+
+
+TORSION = 0.77
+"""GJ by EI, which is that of a round rod."""
+LIMITS = np.log([0.02, 50.0])
+"""Logarithms of the stiffnesses out of the plane between which the least one is searched."""
+
+
+def space_stiffness(folder: Path, settings: tuple[int, int] = (17, 17)) -> dict[str, float]:
+    """Find the least stiffness for the way inside out, and for loading over both end angles."""
+    way = way_inside_out().states
+    numbers = {
+        f"least A for the way inside out, C = {torsion:g}": least_stiffness(way, torsion)
+        for torsion in (0.77, 1.0, 1.4)
+    }
+    rest = ARCH.natural_state(Theta=0.9)
+    limit = em.limit_load(rest, "q").value
+    for text, load in (("q = 2.5", LOAD), ("the planar limit load", limit - 1e-5)):
+        states = em.lift(rest, {"q": load}).states
+        numbers[f"least A at (0.9, 0) up to {text}"] = least_stiffness(states, TORSION)
+    axes = np.linspace(0.3, 1.5, settings[0]), np.linspace(0.0, 1.2, settings[1])
+    least = np.full(settings, np.nan)
+    for i, j in np.ndindex(settings):
+        rest = ARCH.natural_state(Theta=float(axes[0][i]), Delta=float(axes[1][j]))
+        states = em.lift(rest, {"q": LOAD}).states
+        least[i, j] = least_stiffness(states[-1:], TORSION)  # the end is mostly the worst
+        if lateral_margins(states, TORSION, 1.001 * float(least[i, j])).min() < 0.0:
+            least[i, j] = least_stiffness(states, TORSION)
+    levels, drawing = np.arange(0.2, 3.0, 0.2), Figure(figsize=(3.5, 2.8))
+    with em.plotting.house_style():
+        ax = drawing.add_axes((0.14, 0.14, 0.8, 0.82))
+        lines = ax.contour(*axes, least.T, levels, colors="#1a1a1a", linewidths=0.8)
+        ax.clabel(lines, fmt="%.1f")
+        ax.set(xlabel="Θ (rad)", ylabel="Δ (rad)")
+        em.plotting.save(drawing, folder, "space-stiffness")
+    numbers["largest least A of the figure"] = float(least.max())
+    return numbers
+
+
+def least_stiffness(states: em.States, torsion: float) -> float:
+    """Smallest EI out of the plane, by that in it, for which all states are stable in space."""
+    root = brentq(
+        lambda log: lateral_margins(states, torsion, np.exp(log)).min(), *LIMITS, xtol=1e-7
+    )
+    return float(np.exp(root))
+
+
+def way_inside_out() -> em.Path:
+    """The article's way inside out of the planar arch, in short steps."""
+    up = em.lift(ARCH.natural_state(Theta=1.0), {"q": LOAD}).end.state
+    return em.lift(up, WAY, options=em.TraceOptions(largest_step=0.05))
+
+
+def strip(ratio: float) -> dict[str, float]:
+    """Torsional and lateral stiffness of a rectangular section by the one in the plane."""
+    section = em.Strip(width=ratio, thickness=1.0, E=1.0, nu=POISSON).properties()
+    return {"torsion": section.torsion, "lateral": section.lateral}
+
+
+def lateral_margins(states: em.States, torsion: float, lateral: float) -> np.ndarray:
+    """Lowest lateral eigenvalues of planar states for other stiffnesses out of the plane."""
+    return np.asarray(ARCH.lateral_margin(torsion, lateral)(states))
