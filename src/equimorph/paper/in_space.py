@@ -1,12 +1,21 @@
 """The article's arch in space: limit loads, the way inside out, how stiff is stiff enough."""
 
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from matplotlib.figure import Figure
 from scipy.optimize import brentq
 
 import equimorph as em
+
+
+class Stiffness(NamedTuple):
+    """Of a section against torsion and out of the plane, by the one in the plane."""
+
+    torsion: float
+    lateral: float
+
 
 GRID = {"Theta": (0.3, 1.6, 40), "Delta": (-1.2, 1.2, 40)}
 RATIOS = (1.25, 1.5, 3.0)
@@ -21,7 +30,10 @@ def space_loads(folder: Path, grid: em.Grid | None = None) -> dict[str, float]:
     """Compute the maps, the first lateral loads of the round rod, and what the strips need."""
     grid = grid or em.Grid(**GRID)
     rods = {"planar": em.Rod(), "round": em.Rod(torsion=1 / (1 + POISSON), lateral=1.0)}
-    rods |= {f"strip {ratio:g}": em.Rod(**strip(ratio)) for ratio in RATIOS}
+    rods |= {
+        f"strip {ratio:g}": em.Rod(torsion=strip(ratio).torsion, lateral=strip(ratio).lateral)
+        for ratio in RATIOS
+    }
     numbers: dict[str, float] = {}
     highest = 0.0
     for name, rod in rods.items():
@@ -55,10 +67,7 @@ LOAD = 2.5
 """Uniform load q on the way inside out."""
 ROUTE_RATIOS = (2.0, 10**0.5, 10.0, 40.0)
 """Widths of strips by their thicknesses."""
-SECTIONS = {
-    "round": {"torsion": 0.77, "lateral": 1.0},
-    "A = 2, C = 0.9": {"torsion": 0.9, "lateral": 2.0},
-}
+SECTIONS = {"round": Stiffness(0.77, 1.0), "A = 2, C = 0.9": Stiffness(0.9, 2.0)}
 """Further stiffnesses GJ = C EI and A EI out of the plane."""
 COLOURS = ("#d1004b", "#e8902a", "#90b4d6", "#417aac", "#1d3f66")
 
@@ -68,10 +77,10 @@ def space_route(folder: Path, widths: int = 60) -> dict[str, float]:
     path = way_inside_out()
     strips = {f"{ratio:.3g} : 1": strip(ratio) for ratio in ROUTE_RATIOS}
     found = {
-        name: lateral_margins(path.states, **stiff) for name, stiff in (SECTIONS | strips).items()
+        name: lateral_margins(path.states, *stiff) for name, stiff in (SECTIONS | strips).items()
     }
     ratios = np.geomspace(1.0, 40.0, widths)
-    least = [lateral_margins(path.states, **strip(ratio)).min() for ratio in ratios]
+    least = [lateral_margins(path.states, *strip(ratio)).min() for ratio in ratios]
     panels = Figure(figsize=(7.2, 2.6))
     with em.plotting.house_style():
         along, over = panels.subplots(1, 2)
@@ -144,10 +153,10 @@ def way_inside_out() -> em.Path:
     return em.lift(up, WAY, options=em.TraceOptions(largest_step=0.05))
 
 
-def strip(ratio: float) -> dict[str, float]:
+def strip(ratio: float) -> Stiffness:
     """Torsional and lateral stiffness of a rectangular section by the one in the plane."""
     section = em.Strip(width=ratio, thickness=1.0, E=1.0, nu=POISSON).properties()
-    return {"torsion": section.torsion, "lateral": section.lateral}
+    return Stiffness(section.torsion, section.lateral)
 
 
 def lateral_margins(states: em.States, torsion: float, lateral: float) -> np.ndarray:
