@@ -6,9 +6,11 @@ discretisations, and the landing of the gradient flow.
 
 import numpy as np
 import pytest
+from scipy.special import ai_zeros
 
 import equimorph as em
 from equimorph.dynamics import ReplaySettings, replay
+from equimorph.dynamics.fold_delay import FoldDelay
 from equimorph.dynamics.linkage_model import LinkageModel
 from equimorph.dynamics.rods import ChainedRod
 
@@ -141,6 +143,14 @@ def test_rest_at_the_start_converges_to_second_order(upright):
     assert second < 1e-4
     assert first / second == pytest.approx(4.0, abs=0.3)
     assert second / third == pytest.approx(4.0, abs=0.3)
+
+
+def test_without_inertia_the_delay_is_that_of_the_airy_function():
+    """To infinity at 2.338 (c²/(a b))^⅓, 2.338 the first zero of Ai(−x) [BerglundGentz2006]_."""
+    drive, curvature, resistance = 0.02, 0.7, 0.3
+    delay = FoldDelay(1e-4, resistance, drive, curvature, reach=1.0)
+    expected = -ai_zeros(1)[0][0] * (resistance**2 / (drive * curvature)) ** (1 / 3)
+    assert delay.lateness(1e3) == pytest.approx(expected, rel=2e-3)
 
 
 @pytest.mark.slow

@@ -48,6 +48,20 @@ def test_mujoco_rests_where_the_chain_has_its_equilibrium(name):
     assert np.abs(made.linkage.places(plant.v) - found.places).max() < 1e-4
 
 
+def test_dampers_turn_with_their_clamp():
+    """A free rod follows a clamp that turns; dampers in the world would hold it back by 0.3."""
+    pytest.importorskip("mujoco", reason="MuJoCo is not installed (extra `replay`)")
+    rod, rate, step = em.Rod(ends=("clamped", "free")), 0.1, 0.05
+    made = model(rod, 8)
+    plant, found = LinkagePlant(made.linkage, step, 3.0), made.balance(rod.natural_state())
+    plant.start(found.v, found.y)
+    for k in range(1, 401):
+        plant.set(np.append(rate * step * k, found.y[1:]))
+        plant.step()
+    behind = rate * step * 400 - plant.v[made.linkage.angle_entries]
+    assert np.abs(behind).max() < 0.01
+
+
 def test_derivatives_of_a_chain_are_those_of_its_residual():
     """Central differences, for a rod with every kind of entry."""
     rod = em.Rod(

@@ -1,6 +1,7 @@
 """Motions in time and their replay, asked for in a study and on the command line."""
 
 import csv
+import itertools
 import json
 import sys
 from functools import partial
@@ -8,11 +9,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image, ImageSequence
 
-from equimorph import plotting
+from equimorph import plotting, verify
 from equimorph.cli import main
 from equimorph.errors import InputError
-from equimorph.storage import read_results, read_schedule
+from equimorph.storage import read_results, read_schedule, write_schedule
 from equimorph.study import prepare, run_study
 from equimorph.study.problem import parse_study
 from studies import draw_dots
@@ -139,3 +141,58 @@ def test_a_trajectory_is_written_for_a_controller(tmp_path):
     assert lines[3:6] == ["joint_names:", '- "spread"', '- "tilt"']
     assert lines[7] == "- positions: [1.0, 0.0]"
     assert lines[8] == "  velocities: [0.0, 0.0]"
+
+
+SPACE = """
+[structure]
+kind = "spatial rod"
+ends = ["clamped", "free"]
+lateral = 2.0
+torsion = 0.8
+curvature = -2.0
+
+[set]
+box = { twist_A = [-0.1, 0.6] }
+within = ["max_curvature <= 20"]
+intervals = [4]
+checks = 0
+
+[[replay]]
+name = "turned"
+start = { at = { twist_A = 0.0 }, lowest = "energy" }
+steps = [{ twist_A = 0.5 }]
+duration = 40.0
+links = 6
+step = 0.1
+hold = 2.0
+damping = 0.5
+"""
+
+
+@pytest.mark.slow
+def test_a_rod_in_space_is_replayed_from_a_study_and_from_a_file(tmp_path, monkeypatch, capsys):
+    """A curved cantilever follows its clamp as it turns; its film has frames that differ."""
+    pytest.importorskip("mujoco", reason="MuJoCo is not installed (extra `replay`)")
+    (tmp_path / "turned.toml").write_text(SPACE)
+    with unchecked():
+        draw_dots(monkeypatch)
+        monkeypatch.setattr(plotting, "replay_film", partial(plotting.replay_film, frames=3))
+        run_study(tmp_path / "turned.toml", tmp_path / "out")
+        kept = read_results(tmp_path / "out" / "results.h5").answers["replay"]["turned"]
+        assert not kept.snapped
+        assert kept.points.shape[2] == 3
+        assert np.ptp(kept.points[:, -1, 2]) > 0.2
+        assert kept.largest_deviation < 0.02
+        with Image.open(tmp_path / "out" / "turned-replay-film.gif") as film:
+            frames = [np.asarray(each.convert("L")) for each in ImageSequence.Iterator(film)]
+        assert len(frames) == 3
+        assert all((one != other).any() for one, other in itertools.pairwise(frames))
+        motion = verify([{"twist_A": 0.5}], kept.start).schedule.in_time(duration=40.0)
+        write_schedule(motion, tmp_path / "turned.csv")
+        arguments = ("replay", str(tmp_path / "turned.csv"), "--links", "6", "--json")
+        monkeypatch.setattr(sys, "argv", ["equimorph", *arguments])
+        with pytest.raises(SystemExit):
+            main()
+    told = json.loads(capsys.readouterr().out)
+    assert told["simulator"] == "mujoco"
+    assert told["discretisation"] == pytest.approx(np.nanmax(kept.discretisation), rel=0.1)

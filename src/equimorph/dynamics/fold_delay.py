@@ -14,8 +14,6 @@ from scipy.integrate import solve_ivp
 
 from equimorph.dynamics.balance import Balance, Course
 
-AIRY = 2.33810741045976703849
-"""First zero of Ai(−x)."""
 BEFORE = 6.0
 """Where the motion begins, in units of the time of the normal form before the fold."""
 PROBE = 1e-4
@@ -39,11 +37,6 @@ class FoldDelay:
     drive: float
     curvature: float
     reach: float
-
-    @property
-    def overdamped(self) -> float:
-        """Delay without inertia, to infinity: 2.338 (c²/(a b))^⅓."""
-        return float(AIRY * (self.resistance**2 / (self.drive * self.curvature)) ** (1.0 / 3.0))
 
     def lateness(self, departure: float) -> float:
         """Time after the fold at which a point has moved by `departure` from where the fold is.

@@ -62,6 +62,8 @@ class LinkagePlant(Simulation):
         writer = Writer(self.tree, step, damping)
         super().__init__(writer.text())
         self._springs = tuple(_Rests.of(each) for each in writer.springs())
+        self._drag, self._step = writer.drag(), step
+        self._dragged: Vector | None = None
         self._hinge = np.array([writer.hinge[k] for k in range(len(self.tree.bodies))])
         self._hinged = np.flatnonzero(self._hinge >= 0)
         self._moved = self._hinge[self._hinged]
@@ -92,6 +94,7 @@ class LinkagePlant(Simulation):
         data, bodies = self.data, self.tree.bodies
         self._mujoco.mj_resetData(self.model, data)
         self.set(y)
+        self._dragged = None
         angles = self.tree.angles(v)
         for k, body in enumerate(bodies):
             if self._hinge[k] >= 0:
@@ -110,6 +113,7 @@ class LinkagePlant(Simulation):
         model, linkage = self.model, self.linkage
         joints, tendons = self._springs
         again = self._y is not None
+        self._dragged = self._drag @ (y - self._y) / self._step if self._y is not None else None
         joints.write(model.qpos_spring, y, again)
         tendons.write(model.tendon_lengthspring, y, again)
         held = np.where(np.isinf(linkage.supports.stiffness), linkage.supports.places @ y, 0.0)
@@ -132,7 +136,9 @@ class LinkagePlant(Simulation):
         return [each for each in found if each[0] >= 0]
 
     def step(self) -> None:
-        """One step in time."""
+        """One step in time; supports that moved since the last one carry their dampers."""
+        self.data.qfrc_applied[:] = 0.0 if self._dragged is None else self._dragged
+        self._dragged = None
         if self._loaded or self._pressed:
             self._apply()
         self._mujoco.mj_step(self.model, self.data)
@@ -146,14 +152,14 @@ class LinkagePlant(Simulation):
         turn = sizes * (c * force[:, 1] - s * force[:, 0]) + self._couple
         if self._pressed:
             turn, force = self._press(angles, sizes, turn, force)
-        data.qfrc_applied[self._moved] = turn @ self._carried
+        data.qfrc_applied[self._moved] += turn @ self._carried
         for at, entry in self._slides:
             node, axis = divmod(entry, 2)
             body = self._body_of_node[node]
-            data.qfrc_applied[at] = force[body] @ self.linkage.supports.axes[node, axis]
+            data.qfrc_applied[at] += force[body] @ self.linkage.supports.axes[node, axis]
         for at, _, link in self._stretches:
             body = self._body_of_link[link]
-            data.qfrc_applied[at] = c[body] * force[body, 0] + s[body] * force[body, 1]
+            data.qfrc_applied[at] += c[body] * force[body, 0] + s[body] * force[body, 1]
 
     def _press(
         self, angles: Angles, sizes: Angles, turn: Angles, force: Float[np.ndarray, "bodies 2"]

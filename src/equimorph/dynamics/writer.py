@@ -8,17 +8,24 @@ import numpy as np
 from equimorph.array_types import Float
 from equimorph.dynamics.tree import WORLD, Tree
 
+Rests = Float[np.ndarray, "2 settings"]
+"""`Spring.rest` and `Spring.held`."""
 SOLVER_STEPS = 50
 """Most iterations of the constraint solver."""
 
 
 @dataclass(frozen=True, eq=False)
 class Spring:
-    """A joint or tendon of the simulation that bends: its number, stiffness and rest by setting."""
+    """A joint or tendon of the simulation that bends.
+
+    at: its number; rest: where it is at rest, by setting; held: the part of that which supports
+    prescribe.
+    """
 
     at: int
     stiffness: float
     rest: Float[np.ndarray, " settings"]
+    held: Float[np.ndarray, " settings"]
 
 
 def document(step: float, world: str, tendons: str, closed: str) -> str:
@@ -103,7 +110,8 @@ class Writer:
                     entry = 2 * body.node + axis
                     self.slides.append((self._joints, entry))
                     rest = linkage.supports.places[body.node, axis]
-                    yield self._joint("slide", f"{unit[0]} {unit[1]} 0", stiff, rest)
+                    rests = np.stack([rest, rest])
+                    yield self._joint("slide", f"{unit[0]} {unit[1]} 0", stiff, rests)
         self.hinge[k] = -1
         if self.tree.entries[k] >= 0:
             yield self._hinge(k)
@@ -120,21 +128,21 @@ class Writer:
             entry = int(linkage.strain_entries.ravel()[body.link])
             self.stretches.append((self._joints, entry, body.link))
             rest = size * linkage.strains.reshape(linkage.axial.size, -1)[body.link]
-            yield self._joint("slide", "1 0 0", axial / size, rest)
+            yield self._joint("slide", "1 0 0", axial / size, np.stack([rest, 0.0 * rest]))
         mass = float(linkage.masses.ravel()[body.link])
         yield inertial(0.5 * size, mass, mass * size**2 / 12.0)
         yield f'<site name="e{k}" pos="{size} 0 0"/>'
 
     def _hinge(self, k: int) -> str:
         self.hinge[k] = self._joints
-        stiffness, rest = self._parts[0].get(k, (0.0, np.zeros(self.linkage.couples.shape[1])))
-        return self._joint("hinge", "0 0 1", stiffness, rest)
+        none = np.zeros((2, self.linkage.couples.shape[1]))
+        return self._joint("hinge", "0 0 1", *self._parts[0].get(k, (0.0, none)))
 
-    def _joint(self, kind: str, axis: str, stiffness: float, rest: np.ndarray) -> str:
+    def _joint(self, kind: str, axis: str, stiffness: float, rests: Rests) -> str:
         number = self._joints
         self._joints += 1
         if stiffness:
-            self.joint_springs.append(Spring(number, stiffness, rest))
+            self.joint_springs.append(Spring(number, stiffness, *rests))
         return (
             f'<joint name="j{number}" type="{kind}" axis="{axis}" stiffness="{stiffness}" '
             f'damping="{self.damping * stiffness}"/>'
@@ -142,18 +150,18 @@ class Writer:
 
     # --- elastic joints -------------------------------------------------------------------------
 
-    def _bends(self) -> tuple[dict[int, tuple[float, np.ndarray]], list[tuple[np.ndarray, Spring]]]:
+    def _bends(self) -> tuple[dict[int, tuple[float, Rests]], list[tuple[np.ndarray, Spring]]]:
         """Elastic joints that are hinges of bodies, and those that tendons replace."""
         tree, linkage = self.tree, self.linkage
         body_of = {int(entry): k for k, entry in enumerate(tree.entries) if entry >= 0}
-        hinges: dict[int, tuple[float, np.ndarray]] = {}
+        hinges: dict[int, tuple[float, Rests]] = {}
         tendons: list[tuple[np.ndarray, Spring]] = []
         bends = linkage.bends
         for i, j, stiff, rest in zip(
             bends.plus.tolist(), bends.minus.tolist(), bends.stiffness.tolist(), bends.rest,
             strict=True,
         ):  # fmt: skip
-            turned = rest.copy()
+            turned = np.stack([rest, 0.0 * rest])
             sides = []
             for entry, sign in ((i, 1.0), (j, -1.0)):
                 k = body_of.get(entry, WORLD)
@@ -161,34 +169,35 @@ class Writer:
                 if k == WORLD:  # held: its prescribed turn goes to the other side
                     turned -= sign * linkage.targets[entry]
                 else:
-                    turned[-1] += sign * tree.offsets[k]
+                    turned[0, -1] += sign * tree.offsets[k]
             self._place(sides, stiff, turned, hinges, tendons)
         for node in range(linkage.nodes):
             stiff = float(linkage.supports.turning[node])
             k = body_of.get(int(linkage.turn_entries[node]), WORLD)
             if 0.0 < stiff < np.inf and k != WORLD:
-                self._place([k, WORLD], stiff, linkage.supports.turns[node].copy(), hinges, tendons)
+                turns = linkage.supports.turns[[node, node]]
+                self._place([k, WORLD], stiff, turns, hinges, tendons)
         return hinges, tendons
 
     def _place(
         self,
         sides: list[int],
         stiffness: float,
-        rest: np.ndarray,
-        hinges: dict[int, tuple[float, np.ndarray]],
+        rests: Rests,
+        hinges: dict[int, tuple[float, Rests]],
         tendons: list[tuple[np.ndarray, Spring]],
     ) -> None:
         first, second = sides
         bodies, above = self.tree.bodies, self.tree.above
         if first != WORLD and bodies[first].parent == second and first not in hinges:
-            hinges[first] = (stiffness, rest)
+            hinges[first] = (stiffness, rests)
         elif second != WORLD and bodies[second].parent == first and second not in hinges:
-            hinges[second] = (stiffness, -rest)
+            hinges[second] = (stiffness, -rests)
         else:
             nothing = np.zeros(len(bodies))
             row = above[first] if first != WORLD else nothing
             row = row - (above[second] if second != WORLD else nothing)
-            tendons.append((row, Spring(len(tendons), stiffness, rest)))
+            tendons.append((row, Spring(len(tendons), stiffness, *rests)))
 
     def _tendons(self) -> str:
         out = []
@@ -207,3 +216,14 @@ class Writer:
     def springs(self) -> tuple[list[Spring], list[Spring]]:
         """Joints and tendons whose rest the settings change; available once the text is written."""
         return self.joint_springs, [spring for _, spring in self._parts[1]]
+
+    def drag(self) -> Float[np.ndarray, "joints settings"]:
+        """Forces on all joints for each rate of the settings: dampers are carried by supports."""
+        out = np.zeros((self._joints, self.linkage.couples.shape[1]))
+        for spring in self.joint_springs:
+            out[spring.at] += spring.stiffness * spring.held
+        for row, spring in self._parts[1]:
+            for k in np.flatnonzero(row).tolist():
+                if self.hinge[k] >= 0:
+                    out[self.hinge[k]] += row[k] * spring.stiffness * spring.held
+        return np.asarray(self.damping * out)

@@ -17,7 +17,7 @@ from equimorph.plotting.moving import film_file, write_film
 from equimorph.plotting.viewpoint import viewpoint_of
 from equimorph.tasks.timing.speed import SpeedLimit
 
-_SMALLEST = 1e-7
+_SMALLEST = 1e-4
 """Least deviation that is drawn, relative to the largest."""
 
 _WIDTH, _HEIGHT, _DOTS = 6.4, 2.8, 120
