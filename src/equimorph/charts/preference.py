@@ -62,10 +62,37 @@ class Preference:
         found = self.cells.find(points)
         return found.take(self.choice.choose(found, points))
 
-    def prefers(self, z: Lanes, p: Parameters) -> Flags:
-        """Whether states of the set are the preferred ones over their points."""
-        both, points = self._with_others(z, p)
+    def prefers(self, z: Lanes, p: Parameters, found: Found | None = None) -> Flags:
+        """Whether states of the set are the preferred ones over their points.
+
+        `found`: all states over these points, if they are known.
+        """
+        both, points = self._with_others(z, p, found)
         return self.choice.choose(both, points)[len(both.point) - len(z) :]
+
+    def over_vertices(self, some: Items) -> Found:
+        """States over vertices of the set: vertices, over the grid; elsewhere they are found."""
+        grid, corners = self.cells.eset.grid_vertex, self.cells.corners
+        away = np.flatnonzero(grid[some] < 0)
+        found = self.cells.find(self.cells.values[some[away]])
+        vertex, first = np.unique(corners, return_index=True)
+        cell = self.cells.numbers[first // corners.shape[1]]
+        order = np.argsort(grid[vertex], kind="stable")
+        own = np.flatnonzero(grid[some] >= 0)
+        low, high = (
+            np.searchsorted(grid[vertex[order]], grid[some[own]], side) for side in ("left", "right")
+        )
+        count = high - low
+        among = order[np.repeat(low - np.cumsum(count) + count, count) + np.arange(count.sum())]
+        states = self.cells.eset.points[vertex[among]]
+        point = np.concatenate([away[found.point], np.repeat(own, count)])
+        both = Found(
+            join_states(states.structure, [found.states, states]),
+            point,
+            np.concatenate([found.cell, cell[among]]),
+            np.concatenate([found.inside, np.ones(len(among), bool)]),
+        )
+        return both.take(np.argsort(point, kind="stable"))
 
     def excess(self, z: Lanes, p: Parameters) -> Values:
         """Function that is positive where another state is preferred.
@@ -95,11 +122,17 @@ class Preference:
         both, _ = self._with_others(start.z, start.p)
         return changes_by_score(choice.score, both, stop, constraints)
 
-    def _with_others(self, z: Lanes, p: Parameters) -> tuple[Found, Points]:
-        """Other states over the points of states, then these; and the points."""
+    def _with_others(
+        self, z: Lanes, p: Parameters, found: Found | None = None
+    ) -> tuple[Found, Points]:
+        """Other states over the points of states, then these; and the points.
+
+        A rule without a score names one state, whatever others there are: they are left out.
+        """
         structure = self.cells.eset.structure
         points, n = self.cells.coordinates(z, p), structure.unknowns
-        found = self.cells.find(points)
+        if found is None:
+            found = self.cells.find(points if self.choice.score is not None else points[:0])
         gap = (found.states.z - z[found.point])[:, :n] ** 2 @ structure.mass
         own = np.sqrt(gap) < DIFFERENT
         # the state itself takes part as it is: at a fold no search would find it
@@ -180,8 +213,9 @@ def _signs(preference: Preference) -> Float[np.ndarray, " V"]:
     met = used[eset.kinds[used] == VertexKind.CROSSING]
     values[met] = np.where(_preferred_beside(preference, met), -1.0, 1.0)
     used = used[eset.kinds[used] != VertexKind.CROSSING]
-    states = eset.points[used]
-    values[used] = np.where(preference.prefers(states.z, states.p), -1.0, 1.0)
+    states, scored = eset.points[used], preference.choice.score is not None
+    found = preference.over_vertices(used) if scored else None
+    values[used] = np.where(preference.prefers(states.z, states.p, found), -1.0, 1.0)
     folded = np.isin(eset.kinds, (VertexKind.FOLD, VertexKind.CORNER))
     # paths to a fold end just before it or there: look a little way off
     doubtful = used[folded[used] & (values[used] > 0.0)]
