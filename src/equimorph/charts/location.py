@@ -23,7 +23,7 @@ from equimorph.equilibria import ParameterLine, TraceOptions
 from equimorph.equilibria.trace import trace
 from equimorph.equilibria.trace_options import EventCode
 from equimorph.manifold import EquilibriumSet
-from equimorph.manifold.geometry.points import VertexKind
+from equimorph.manifold.geometry.points import VertexKind, are_singular, on_fold
 from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.geometry.simplices import volumes
 from equimorph.manifold.geometry.topology import Adjacency, adjacency, flags_of, orientation
@@ -35,8 +35,6 @@ from equimorph.tolerances import SAME_STATE
 
 Guess = tuple[Float[np.ndarray, "hits size"], Float[np.ndarray, "hits parameters"]]
 
-SINGULAR = (VertexKind.FOLD, VertexKind.CORNER, VertexKind.CROSSING)
-"""Kinds of vertices at which the Jacobian is singular."""
 OVERHANG = 0.3
 """How far beyond a cell at an edge, in barycentric coordinates, a point may lie to be tried."""
 CHUNK = 4096
@@ -158,12 +156,12 @@ class Cells:
 
     @cached_property
     def _at_fold(self) -> Bool[np.ndarray, " own"]:
-        return np.asarray(np.isin(self.eset.kinds, SINGULAR)[self.corners].any(axis=1))
+        return np.asarray(are_singular(self.eset.kinds)[self.corners].any(axis=1))
 
     @cached_property
     def _folded(self) -> VertexFlags:
         """Vertices from which states move like the root of the way."""
-        return np.isin(self.eset.kinds, SINGULAR) & self.coordinates.projecting
+        return are_singular(self.eset.kinds) & self.coordinates.projecting
 
     def find(self, points: Points) -> Found:
         """States of the cells that have the coordinates of points."""
@@ -262,7 +260,7 @@ class Cells:
         From the nearest one; if the cell contains the point, from all.
         """
         z, p, good = z.copy(), p.copy(), good.copy()
-        far = np.isin(self.eset.kinds, SINGULAR)[self.corners[hits.cell[again]]]
+        far = are_singular(self.eset.kinds)[self.corners[hits.cell[again]]]
         nearest = np.argsort(1e9 * far - hits.weights[again], axis=1)
         for k, place in enumerate(nearest.T):
             open_ = ~good[again] & ~far[np.arange(len(again)), place]
@@ -336,9 +334,7 @@ def facet_kinds(cells: Cells) -> tuple[Facets, np.ndarray]:
         capped &= ~cells.cut[facets].all(axis=1)
     cut = np.ones(len(facets), bool)
     if cells.cut is not None:  # where an edge could not be cut, whole cells are left out
-        cut = (cells.cut | np.isin(eset.kinds, (VertexKind.FOLD, VertexKind.CORNER)))[facets].all(
-            axis=1
-        )
+        cut = (cells.cut | on_fold(eset.kinds))[facets].all(axis=1)
     kinds = np.select(
         [flags_of(facets, np.concatenate(folds)), ended & on_box & outer, ended & met & outer,
          ended & capped & outer, ended & cut, ended],

@@ -12,7 +12,7 @@ from equimorph.array_types import Float, Int
 from equimorph.arrays import CellFlags, CellNumbers, VertexFlags
 from equimorph.charts.preparation import first_copies
 from equimorph.manifold import EquilibriumSet
-from equimorph.manifold.geometry.points import VertexKind
+from equimorph.manifold.geometry.points import are_singular, on_fold
 from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.geometry.topology import Adjacency, adjacency, faces_of
 from equimorph.manifold.lookup.exact_states import exact_states, root_weights
@@ -129,14 +129,14 @@ def _at_end(eset: EquilibriumSet) -> VertexFlags:
     """Vertices on folds at which the set ends: no way should touch them."""
     whole, at = adjacency(eset.cells), np.zeros(len(eset.points), bool)
     at[whole.facets[whole.counts == 1]] = True
-    return at & np.isin(eset.kinds, (VertexKind.FOLD, VertexKind.CORNER))
+    return at & on_fold(eset.kinds)
 
 
 def _straighten(eset: EquilibriumSet, path: list[int]) -> Way:
     """The way, straight in the parameters between its vertices on folds."""
     if eset.cells.shape[1] != 3:
         return list(path)
-    folded = np.isin(eset.kinds, (VertexKind.FOLD, VertexKind.CORNER, VertexKind.CROSSING))
+    folded = are_singular(eset.kinds)
     stops = [0, *(k for k in range(1, len(path) - 1) if folded[path[k]]), len(path) - 1]
     way: Way = [path[0]]
     for a, b in pairwise(stops):
@@ -155,7 +155,7 @@ def _states_on(eset: EquilibriumSet, way: Way) -> States:
     share = np.array([0.0 if isinstance(s, int) else s[2] for s in way])
     weights = np.stack([1.0 - share, share], axis=1)
     p = np.einsum("nk,nkp->np", weights, eset.points.p[ends])
-    folded = np.isin(eset.kinds, (VertexKind.FOLD, VertexKind.CORNER, VertexKind.CROSSING))[ends]
+    folded = are_singular(eset.kinds)[ends]
     some = np.flatnonzero(folded.any(axis=1) & ~folded.all(axis=1))
     weights[some] = root_weights(weights[some], folded[some])
     z = np.einsum("nk,nki->ni", weights, eset.points.z[ends])

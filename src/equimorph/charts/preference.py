@@ -25,9 +25,15 @@ from equimorph.charts.score_changes import changes_by_score
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.complex.cuts import Ends, cut_between
 from equimorph.manifold.complex.edge_points import Places, on_edges
-from equimorph.manifold.complex.marked_complex import Fabric, FacetMark, edges_of, fabric_of
+from equimorph.manifold.complex.marked_complex import (
+    Fabric,
+    FacetMark,
+    edges_of,
+    ends_of_changes,
+    fabric_of,
+)
 from equimorph.manifold.complex.vertices import Vertices, vertices_of
-from equimorph.manifold.geometry.points import VertexKind
+from equimorph.manifold.geometry.points import VertexKind, are_singular, on_fold
 from equimorph.manifold.geometry.topology import adjacency, flags_of, keys_of
 from equimorph.manifold.lookup.exact_states import exact_states, root_weights
 from equimorph.manifold.queries.levels import part_of
@@ -80,7 +86,8 @@ class Preference:
         order = np.argsort(grid[vertex], kind="stable")
         own = np.flatnonzero(grid[some] >= 0)
         low, high = (
-            np.searchsorted(grid[vertex[order]], grid[some[own]], side) for side in ("left", "right")
+            np.searchsorted(grid[vertex[order]], grid[some[own]], side)
+            for side in ("left", "right")
         )
         count = high - low
         among = order[np.repeat(low - np.cumsum(count) + count, count) + np.arange(count.sum())]
@@ -153,10 +160,10 @@ class Preference:
 def preferred_part(preference: Preference) -> tuple[EquilibriumSet, VertexFlags, int]:
     """The preferred part of a set, which of its vertices lie on cuts, and edges without a cut."""
     eset = preference.cells.eset
-    fabric = fabric_of(eset)
     among = np.zeros(len(eset.cells), bool)
     among[preference.cells.numbers] = True
     values = _signs(preference)
+    fabric = fabric_of(eset, ends_of_changes(preference.cells.corners, values))
     # only candidates are cut: their neighbours beyond folds play no part
     fabric = _only(fabric, among)
     crossings = _Crossings(preference, fabric, values)
@@ -216,7 +223,7 @@ def _signs(preference: Preference) -> Float[np.ndarray, " V"]:
     states, scored = eset.points[used], preference.choice.score is not None
     found = preference.over_vertices(used) if scored else None
     values[used] = np.where(preference.prefers(states.z, states.p, found), -1.0, 1.0)
-    folded = np.isin(eset.kinds, (VertexKind.FOLD, VertexKind.CORNER))
+    folded = on_fold(eset.kinds)
     # paths to a fold end just before it or there: look a little way off
     doubtful = used[folded[used] & (values[used] > 0.0)]
     pairs = np.unique(
@@ -242,7 +249,7 @@ def _preferred_beside(preference: Preference, met: Items) -> ItemFlags:
     two = list(permutations(range(corners.shape[1]), 2))
     pairs = np.concatenate([corners[:, list(each)] for each in two])
     cell = np.tile(preference.cells.numbers, len(two))
-    regular = ~np.isin(eset.kinds, (VertexKind.FOLD, VertexKind.CORNER, VertexKind.CROSSING))
+    regular = ~are_singular(eset.kinds)
     kept = np.flatnonzero(np.isin(pairs[:, 0], met) & regular[pairs[:, 1]])
     _, first = np.unique(pairs[kept, 0], return_index=True)
     vertex, other = pairs[kept[first]].T
@@ -318,7 +325,7 @@ class _Straight:
     @cached_property
     def _folded(self) -> Bool[np.ndarray, "edges 2"]:
         """Which ends lie on folds."""
-        return np.isin(self.fabric.vertices.kinds[self.ends], (VertexKind.FOLD, VertexKind.CORNER))
+        return on_fold(self.fabric.vertices.kinds[self.ends])
 
     def changes(
         self, preference: Preference, lanes: Items, span: Float[np.ndarray, "n 2"], first: ItemFlags
@@ -364,14 +371,14 @@ def _vertices(fabric: Fabric, ends: Ends, index: Items, z: Lanes, p: Parameters)
     """Vertices on edges, on the same folds and caps as both ends."""
     store = fabric.vertices
     kinds = store.kinds[ends]
-    on_fold = np.isin(kinds, (VertexKind.FOLD, VertexKind.CORNER)).all(axis=1)
+    folded = on_fold(kinds).all(axis=1)
     on_cap = np.isin(kinds, (VertexKind.CAP, VertexKind.CORNER)).all(axis=1)
     kind = np.select(
-        [on_fold & on_cap, on_fold, on_cap],
+        [folded & on_cap, folded, on_cap],
         [VertexKind.CORNER, VertexKind.FOLD, VertexKind.CAP],
         VertexKind.REFINED,
     )
-    plain = np.isin(kinds[:, 0], (VertexKind.FOLD, VertexKind.CORNER)).astype(int)
+    plain = on_fold(kinds[:, 0]).astype(int)
     rows = store.rows[ends[np.arange(len(ends)), plain]]
     rows, nowhere = np.ascontiguousarray(rows), np.full(len(ends), -1)
     return vertices_of(fabric.setting, z, p, kind, index, nowhere, rows)

@@ -9,7 +9,7 @@ from equimorph.arrays import Facets, ItemFlags, Items, Pairs, VertexNumbers
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.complex.kept_sets import kept
 from equimorph.manifold.complex.marked_complex import Fabric, fabric_of
-from equimorph.manifold.geometry.points import VertexKind
+from equimorph.manifold.geometry.points import VertexKind, on_fold
 from equimorph.manifold.geometry.simplices import volumes
 from equimorph.manifold.geometry.topology import (
     Adjacency,
@@ -95,7 +95,7 @@ def with_cusp_vertices(eset: EquilibriumSet) -> EquilibriumSet:
 
 @kept
 def _with_cusps(eset: EquilibriumSet) -> EquilibriumSet | None:
-    fabric, cusps = add_cusp_vertices(fabric_of(eset))
+    fabric, cusps = add_cusp_vertices(fabric_of(eset, on_fold(eset.kinds)))
     if len(cusps) == 0:
         return None
     nothing = np.zeros(len(fabric.vertices), bool)

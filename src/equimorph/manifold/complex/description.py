@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from equimorph.array_types import Bool, Float, Int
-from equimorph.arrays import CellFlags, CellNumbers, Cells, Facets, VertexFlags, VertexNumbers
+from equimorph.arrays import CellFlags, CellNumbers, Cells, Facets, VertexNumbers
 from equimorph.manifold.complex.audit import Audit
 from equimorph.manifold.complex.base_mesh import BaseMesh
 from equimorph.manifold.complex.equilibrium_set import (
@@ -16,7 +16,7 @@ from equimorph.manifold.complex.equilibrium_set import (
     EquilibriumSet,
     Stratum,
 )
-from equimorph.manifold.geometry.points import VertexKind
+from equimorph.manifold.geometry.points import are_singular
 from equimorph.manifold.geometry.setting import Setting
 from equimorph.manifold.geometry.topology import (
     PAIR,
@@ -285,7 +285,7 @@ def contradictions(
 
     At folds, and where sheets cross, the eigenvalues that vanish may count or not.
     """
-    structure, singular = points.structure, singular_points(kinds)
+    structure, singular = points.structure, are_singular(kinds)
     low = structure.index(points.z, points.p)
     high = low.copy()
     z, p = points.z[singular], points.p[singular]
@@ -301,15 +301,10 @@ def overturned_off_folds(
     kinds: VertexNumbers, cells: Cells, overturned: CellFlags, place: Float[np.ndarray, "V d"]
 ) -> CellFlags:
     """Overturned cells without a vertex on a fold that are no slivers, in scaled parameters."""
-    off = np.flatnonzero(overturned & ~singular_points(kinds)[cells].any(axis=1))
+    off = np.flatnonzero(overturned & ~are_singular(kinds)[cells].any(axis=1))
     corners = place[cells[off]]
     sides = corners[:, 1:] - corners[:, :1]
     longest = np.linalg.norm(corners[:, :, None] - corners[:, None], axis=3).max(axis=(1, 2))
     turned = np.zeros(len(cells), bool)
     turned[off] = np.abs(np.linalg.det(sides)) > SLIVER * longest ** sides.shape[1]
     return turned
-
-
-def singular_points(kinds: VertexNumbers) -> VertexFlags:
-    """Which points lie on a fold, or where sheets cross."""
-    return np.isin(kinds, (VertexKind.FOLD, VertexKind.CORNER, VertexKind.CROSSING))

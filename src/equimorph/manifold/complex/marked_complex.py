@@ -21,6 +21,7 @@ from equimorph.arrays import (
     ItemFlags,
     Items,
     Triples,
+    VertexFlags,
     VertexNumbers,
 )
 from equimorph.linalg.lanes import results_of
@@ -29,8 +30,7 @@ from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.manifold.complex.vertices import (
     Vertices,
     on_constraints,
-    vertices_of,
-    vertices_without_frames,
+    vertices_framed_at,
 )
 from equimorph.manifold.geometry.kernels import cut_rows, look_back, number_edges, square_sides
 from equimorph.manifold.geometry.points import VertexKind
@@ -259,10 +259,13 @@ def held_parameters(mark: int, dimension: int) -> list[int]:
     return [k for k in range(dimension) if mark & (3 * FacetMark.SIDE << 2 * k)]
 
 
-def fabric_of(eset: EquilibriumSet, *, framed: bool = True) -> Fabric:
+def fabric_of(eset: EquilibriumSet, framed: VertexFlags | None = None) -> Fabric:
     """Return a set as a fabric: its sheets are parted where they cross.
 
-    Without frames at its vertices, which take most of the time, it serves to select cells.
+    Frames take most of the time; only vertices at the ends of edges that are cut need them. Sets
+    whose sheets cross have them everywhere: a cut of one sheet continues on the other.
+
+    framed: vertices at which frames are needed; all if None.
     """
     setting, d = eset.setting, len(eset.names)
     crossings, folds = (
@@ -274,21 +277,19 @@ def fabric_of(eset: EquilibriumSet, *, framed: bool = True) -> Fabric:
     z, p = eset.points.z[origin], eset.points.p[origin]
     whole = adjacency(cells)
     sense = senses(cells, eset.cell_index, eset.coordinates[origin], whole)
-    kinds, index, grid_vertex = (
-        column[origin] for column in (eset.kinds, eset.index, eset.grid_vertex)
-    )
-    if framed:
-        rows = best_corners(setting, z, p, cells, sense.signs)
-        vertices = vertices_of(setting, z, p, kinds, index, grid_vertex, rows)
-    else:
-        vertices = vertices_without_frames(z, p, kinds, index, grid_vertex)
+    known = z, p, eset.kinds[origin], eset.index[origin], eset.grid_vertex[origin]
+    if framed is None or (eset.crossings and framed.any()):
+        framed = np.ones(len(eset.points), bool)
+    some = framed[origin]
+    rows = best_corners(setting, z, p, cells, sense.signs, some)
+    vertices = vertices_framed_at(setting, some, known, rows)
     common = np.where(np.isin(origin, crossings), origin, -1)
     vertices = replace(vertices, shared=common)
-    known = origin[whole.facets]
-    folded, crossed = (flags_of(known, each) for each in (folds, crossings))
+    place = origin[whole.facets]
+    folded, crossed = (flags_of(place, each) for each in (folds, crossings))
     outer = whole.counts == 1
     marks = np.where(folded, FacetMark.FOLD, 0) | np.where(crossed, FacetMark.CROSSING, 0)
-    outer_marks = _outer_marks(setting, eset, known[outer])
+    outer_marks = _outer_marks(setting, eset, place[outer])
     # of parts of sets folds are boundaries, too
     marks[outer] |= np.where(marks[outer] > 0, outer_marks & ~FacetMark.HOLE, outer_marks)
     marked = marks > 0
@@ -296,9 +297,16 @@ def fabric_of(eset: EquilibriumSet, *, framed: bool = True) -> Fabric:
     if d >= TRIANGLES:
         against = sense.signs < 0
         cells[against, -2:] = cells[against, :-3:-1]
-    squared = squared_sides(vertices.place, cells) if framed else np.zeros((len(cells), 0))
+    squared = squared_sides(vertices.place, cells)
     facets = (whole.facets[marked], marks[marked])
     return Fabric(setting, box, vertices, cells, eset.cell_index, *facets, squared)
+
+
+def ends_of_changes(cells: Cells, values: Float[np.ndarray, " V"]) -> VertexFlags:
+    """Vertices of the cells in which values at vertices have different signs."""
+    own, out = values[cells], np.zeros(len(values), bool)
+    out[cells[(own.min(axis=1) < 0.0) & (own.max(axis=1) > 0.0)]] = True
+    return out
 
 
 def _facets(piece: Int[np.ndarray, "..."], d: int) -> Facets:

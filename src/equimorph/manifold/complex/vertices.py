@@ -6,11 +6,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from equimorph.array_types import Float
-from equimorph.arrays import ItemFlags, VertexNumbers
+from equimorph.arrays import ItemFlags, Lanes, Parameters, VertexFlags, VertexNumbers
 from equimorph.columns import Columns
 from equimorph.manifold.geometry.crossings import crossing_frames
 from equimorph.manifold.geometry.exact_points import Corrected
-from equimorph.manifold.geometry.points import VertexKind
+from equimorph.manifold.geometry.points import VertexKind, on_fold
 from equimorph.manifold.geometry.setting import Setting, embed
 from equimorph.manifold.geometry.tangents import (
     cap_slopes,
@@ -122,7 +122,7 @@ def vertices_of(
     capped = np.isin(kinds, (VertexKind.CAP, VertexKind.CORNER))
     capped[met] = on_constraints(setting, z[met], p[met])
     for out, function, wanted in (
-        (folds, fold_slopes, np.isin(kinds, (VertexKind.FOLD, VertexKind.CORNER))),
+        (folds, fold_slopes, on_fold(kinds)),
         (caps, cap_slopes, capped),
     ):
         own = np.flatnonzero(wanted)
@@ -132,18 +132,26 @@ def vertices_of(
     return _with_slopes(setting, z, p, kinds, index, grid_vertex, frame, slopes)
 
 
-def vertices_without_frames(
-    z: Float[np.ndarray, "V size"],
-    p: Float[np.ndarray, "V P"],
-    kinds: VertexNumbers,
-    index: VertexNumbers,
-    grid_vertex: VertexNumbers,
+def vertices_framed_at(
+    setting: Setting,
+    some: VertexFlags,
+    known: tuple[Lanes, Parameters, VertexNumbers, VertexNumbers, VertexNumbers],
+    rows: Float[np.ndarray, "some d coordinates"],
 ) -> Vertices:
-    """Vertices of which neither frames nor slopes are known, nor places in the embedding."""
-    none, lone = np.zeros((len(z), 0)), np.full(len(z), -1)
-    frames = np.zeros((len(z), 0, 0))
-    unknown = (none, frames, frames, none, none, none)
-    return Vertices(z, p, kinds, index, grid_vertex, *unknown, lone)
+    """Vertices of which some have frames and slopes, with zeros for the others.
+
+    `known`: the arguments z to grid_vertex of `vertices_of`; `rows` are planes near `some`.
+    """
+    framed, count = vertices_of(setting, *(each[some] for each in known), rows), len(known[0])
+    columns = {
+        name: np.zeros((count, *column.shape[1:]), column.dtype)
+        for name, column in framed.columns.items()
+    }
+    for name, column in framed.columns.items():
+        columns[name][some] = column
+    whole = dict(zip(columns, known, strict=False))
+    columns |= {**whole, "place": embed(setting, *known[:2]), "shared": np.full(count, -1)}
+    return Vertices(**columns)
 
 
 def free_vertices(setting: Setting, at: Corrected) -> Vertices:

@@ -35,6 +35,16 @@ class VertexKind(IntEnum):
 GRID, FOLD, CAP, BETWEEN, CORNER, AMID, REFINED, CROSSING = VertexKind
 
 
+def on_fold(kinds: Int[np.ndarray, "..."]) -> Bool[np.ndarray, "..."]:
+    """Which vertices lie on folds."""
+    return np.isin(kinds, (FOLD, CORNER))
+
+
+def are_singular(kinds: Int[np.ndarray, "..."]) -> Bool[np.ndarray, "..."]:
+    """Which vertices lie on folds or crossings, where F_z is singular."""
+    return np.isin(kinds, (FOLD, CORNER, CROSSING))
+
+
 @dataclass
 class Points:
     """Growing store of points; those over a grid vertex are found again by their configuration.

@@ -17,6 +17,7 @@ from equimorph.arrays import (
     Places,
     Rows,
     Values,
+    VertexFlags,
 )
 from equimorph.columns import Columns
 from equimorph.equilibria.critical import Critical, null_border
@@ -172,18 +173,28 @@ class Cubics:
 
 
 def best_corners(
-    setting: Setting, z: Lanes, p: Parameters, cells: Cells, signs: CellNumbers | None = None
+    setting: Setting,
+    z: Lanes,
+    p: Parameters,
+    cells: Cells,
+    signs: CellNumbers | None = None,
+    some: VertexFlags | None = None,
 ) -> Rows:
     """Orthonormal bases of the planes of the cell around each vertex that is the least slender.
 
-    Oriented as the cells are with the given signs, if these matter.
+    Oriented as the cells are with the given signs, if these matter. `some`: vertices for which they
+    are needed; all of the cells if None.
     """
     place = embed(setting, z, p)
+    if some is not None:
+        around = some[cells].any(axis=1)
+        cells, signs = cells[around], None if signs is None else signs[around]
     corners, count = cells.shape[1], len(cells)
     owner = cells.T.ravel()
     breadth = _breadths(place, cells).T.ravel()
     order = np.lexsort((-breadth, owner))
     first = order[np.diff(owner[order], prepend=-1) > 0]
+    first = first if some is None else first[some[owner[first]]]
     corner, cell = np.divmod(first, count)
     others = np.stack([np.delete(np.arange(corners), k) for k in range(corners)])[corner]
     sides = place[cells[cell[:, None], others]] - place[cells[cell, corner]][:, None]

@@ -18,7 +18,7 @@ from equimorph.equilibria.soft_modes import metric_length
 from equimorph.equilibria.ways import Nowhere, ways_over
 from equimorph.errors import InputError
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
-from equimorph.manifold.geometry.points import VertexKind
+from equimorph.manifold.geometry.points import on_fold
 from equimorph.manifold.lookup.cell_index import CellIndex
 from equimorph.manifold.lookup.exact_states import root_weights
 from equimorph.manifold.lookup.states_over import StatesOver
@@ -290,7 +290,7 @@ class SetBarriers:
         n, cell = structure.unknowns, over.cell[saddles]
         row = known.row[cell]
         x = over.states.p[saddles][:, eset.setting.free]
-        folded = np.isin(eset.kinds[eset.cells[cell]], (VertexKind.FOLD, VertexKind.CORNER))
+        folded = on_fold(eset.kinds[eset.cells[cell]])
         shares = np.clip(np.nan_to_num(self._maps.weights(x, cell)), 0.0, 1.0)
         weights = root_weights(shares / shares.sum(axis=1, keepdims=True), folded)
         guess = np.einsum("sc,scek->sek", weights, known.ends[row][..., :n])

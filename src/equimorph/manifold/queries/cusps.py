@@ -15,7 +15,7 @@ from equimorph.manifold.complex.cuts import roots
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.manifold.complex.marked_complex import Fabric, FacetMark, fabric_of
 from equimorph.manifold.complex.vertices import Vertices
-from equimorph.manifold.geometry.points import VertexKind
+from equimorph.manifold.geometry.points import VertexKind, on_fold
 from equimorph.manifold.geometry.setting import Setting, embed
 from equimorph.structures import States
 from equimorph.tolerances import SAME_STATE
@@ -53,7 +53,7 @@ def cusps(eset: EquilibriumSet) -> Cusps:
     """
     if len(eset.names) != 2:
         raise InputError(f"`eset` must be over two parameters; got {len(eset.names)}.")
-    fabric = fabric_of(eset)
+    fabric = fabric_of(eset, on_fold(eset.kinds))
     ends = fabric.facets[(fabric.marks & FacetMark.FOLD) > 0]
     hubs = _turning_hubs(fabric, ends)
     ends = ends[(fabric.vertices.kinds[ends] != VertexKind.CROSSING).all(axis=1)]

@@ -20,9 +20,14 @@ from equimorph.manifold.complex.cuts import (
 )
 from equimorph.manifold.complex.description import describe_again
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
-from equimorph.manifold.complex.marked_complex import Fabric, FacetMark, fabric_of
+from equimorph.manifold.complex.marked_complex import (
+    Fabric,
+    FacetMark,
+    ends_of_changes,
+    fabric_of,
+)
 from equimorph.manifold.complex.vertices import Vertices
-from equimorph.manifold.geometry.points import VertexKind
+from equimorph.manifold.geometry.points import VertexKind, on_fold
 from equimorph.manifold.geometry.setting import Setting, embed
 from equimorph.manifold.geometry.tangents import split_step
 from equimorph.manifold.geometry.topology import adjacency, pieces
@@ -114,7 +119,7 @@ def divided(eset: EquilibriumSet, descriptors: Sequence[Descriptor]) -> Division
 @check_arguments
 def divided_by(eset: EquilibriumSet, constraint: Constraint) -> Division:
     """Cut a set exactly along the bound of a constraint; the side is -1 where it is obeyed."""
-    return _divide(eset, _cut(fabric_of(eset), lambda v: constraint.excess(v.z, v.p)))
+    return _divide(eset, _cut_at_bound(eset, constraint))
 
 
 def _divide(eset: EquilibriumSet, cut: "Cut") -> Division:
@@ -150,11 +155,10 @@ def restricted(eset: EquilibriumSet, constraint: Constraint) -> EquilibriumSet:
     InputError
         If it is no constraint.
     """
-    fabric = fabric_of(eset)
-    cut = _cut(fabric, lambda v: constraint.excess(v.z, v.p))
+    cut = _cut_at_bound(eset, constraint)
     inside = (cut.values[cut.fabric.cells] <= 0.0).all(axis=1)
     constraints = (*eset.constraints, constraint)
-    setting = replace(fabric.setting, constraints=constraints)
+    setting = replace(eset.setting, constraints=constraints)
     return part_of(eset, replace(cut.fabric, setting=setting), inside, cut.on_level, cut.lost)
 
 
@@ -170,7 +174,7 @@ def cell_sizes(eset: EquilibriumSet) -> Float[np.ndarray, " C"]:
 @check_arguments
 def part(eset: EquilibriumSet, cells: CellFlags) -> EquilibriumSet:
     """Selected cells as a set, like the stable ones: ``eset.cell_index == 0``."""
-    fabric = fabric_of(eset, framed=False)
+    fabric = fabric_of(eset, np.zeros(len(eset.points), bool))
     nothing = np.zeros(len(fabric.vertices), bool)
     return part_of(eset, fabric, cells, nothing, 0)
 
@@ -183,6 +187,12 @@ def _level(eset: EquilibriumSet, function: Function) -> Level:
     used, inverse = np.unique(facets, return_inverse=True)
     states = States(eset.structure, store.z[used], store.p[used])
     return Level(states, tuple(pieces(inverse.reshape(facets.shape))), cut.lost)
+
+
+def _cut_at_bound(eset: EquilibriumSet, constraint: Constraint) -> Cut:
+    excess = constraint.excess(eset.points.z, eset.points.p)
+    fabric = fabric_of(eset, ends_of_changes(eset.cells, excess))
+    return _cut(fabric, lambda v: constraint.excess(v.z, v.p))
 
 
 def _cut(fabric: Fabric, function: Function) -> Cut:
@@ -215,7 +225,7 @@ def part_of(
     kinds = fabric.vertices.kinds.copy()
     plain = on_level & (kinds != VertexKind.CROSSING)
     kinds[plain] = np.where(
-        np.isin(kinds[plain], (VertexKind.FOLD, VertexKind.CORNER)),
+        on_fold(kinds[plain]),
         VertexKind.CORNER,
         VertexKind.CAP,
     )
