@@ -179,7 +179,7 @@ def best_corners(
     cells: Cells,
     signs: CellNumbers | None = None,
     some: VertexFlags | None = None,
-) -> Rows:
+) -> Float[np.ndarray, "some d coordinates"]:
     """Orthonormal bases of the planes of the cell around each vertex that is the least slender.
 
     Oriented as the cells are with the given signs, if these matter. `some`: vertices for which they
