@@ -129,7 +129,7 @@ def _at_end(eset: EquilibriumSet) -> VertexFlags:
     """Vertices on folds at which the set ends: no way should touch them."""
     whole, at = adjacency(eset.cells), np.zeros(len(eset.points), bool)
     at[whole.facets[whole.counts == 1]] = True
-    return at & on_fold(eset.kinds)
+    return np.asarray(at & on_fold(eset.kinds))
 
 
 def _straighten(eset: EquilibriumSet, path: list[int]) -> Way:

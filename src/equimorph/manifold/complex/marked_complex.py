@@ -29,12 +29,13 @@ from equimorph.manifold.complex.description import Complex
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.manifold.complex.vertices import (
     Vertices,
+    among_unframed,
     on_constraints,
-    vertices_framed_at,
+    vertices_of,
 )
 from equimorph.manifold.geometry.kernels import cut_rows, look_back, number_edges, square_sides
 from equimorph.manifold.geometry.points import VertexKind
-from equimorph.manifold.geometry.setting import Setting
+from equimorph.manifold.geometry.setting import Setting, embed
 from equimorph.manifold.geometry.tangents import (
     Ends,
     best_corners,
@@ -277,12 +278,14 @@ def fabric_of(eset: EquilibriumSet, framed: VertexFlags | None = None) -> Fabric
     z, p = eset.points.z[origin], eset.points.p[origin]
     whole = adjacency(cells)
     sense = senses(cells, eset.cell_index, eset.coordinates[origin], whole)
-    known = z, p, eset.kinds[origin], eset.index[origin], eset.grid_vertex[origin]
+    known = {name: getattr(eset, name)[origin] for name in ("kinds", "index", "grid_vertex")}
+    known |= {"z": z, "p": p}
     if framed is None or (eset.crossings and framed.any()):
         framed = np.ones(len(eset.points), bool)
     some = framed[origin]
     rows = best_corners(setting, z, p, cells, sense.signs, some)
-    vertices = vertices_framed_at(setting, some, known, rows)
+    own = vertices_of(setting, rows=rows, **{name: each[some] for name, each in known.items()})
+    vertices = among_unframed(own, some, embed(setting, z, p), known)
     common = np.where(np.isin(origin, crossings), origin, -1)
     vertices = replace(vertices, shared=common)
     place = origin[whole.facets]

@@ -1,12 +1,12 @@
 """Vertices of a complex that is being cut and rearranged: exact points with tangent frames."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from equimorph.array_types import Float
-from equimorph.arrays import ItemFlags, Lanes, Parameters, VertexFlags, VertexNumbers
+from equimorph.arrays import ItemFlags, VertexFlags, VertexNumbers
 from equimorph.columns import Columns
 from equimorph.manifold.geometry.crossings import crossing_frames
 from equimorph.manifold.geometry.exact_points import Corrected
@@ -132,26 +132,22 @@ def vertices_of(
     return _with_slopes(setting, z, p, kinds, index, grid_vertex, frame, slopes)
 
 
-def vertices_framed_at(
-    setting: Setting,
+def among_unframed(
+    framed: Vertices,
     some: VertexFlags,
-    known: tuple[Lanes, Parameters, VertexNumbers, VertexNumbers, VertexNumbers],
-    rows: Float[np.ndarray, "some d coordinates"],
+    place: Float[np.ndarray, "V coordinates"],
+    known: Mapping[str, np.ndarray],
 ) -> Vertices:
-    """Vertices of which some have frames and slopes, with zeros for the others.
+    """Some vertices with their frames among others, whose frames and slopes are zeros.
 
-    `known`: the arguments z to grid_vertex of `vertices_of`; `rows` are planes near `some`.
+    `known`: the other columns of all vertices, by name.
     """
-    framed, count = vertices_of(setting, *(each[some] for each in known), rows), len(known[0])
-    columns = {
-        name: np.zeros((count, *column.shape[1:]), column.dtype)
-        for name, column in framed.columns.items()
-    }
+    columns = {**known, "place": place, "shared": np.full(len(some), -1)}
     for name, column in framed.columns.items():
-        columns[name][some] = column
-    whole = dict(zip(columns, known, strict=False))
-    columns |= {**whole, "place": embed(setting, *known[:2]), "shared": np.full(count, -1)}
-    return Vertices(**columns)
+        if name not in columns:
+            columns[name] = np.zeros((len(some), *column.shape[1:]), column.dtype)
+            columns[name][some] = column
+    return replace(framed, **columns, room=None)
 
 
 def free_vertices(setting: Setting, at: Corrected) -> Vertices:
