@@ -19,6 +19,7 @@ from argument_faults import outcome
 from equimorph.argument_checks import CHECKED
 from equimorph.argument_kinds import NUMBERS
 from equimorph.errors import InputError
+from equimorph.tasks.planning.objectives import Extreme
 from oracles.specimens import arch_truss, toggle
 from typecheck import unchecked
 
@@ -80,6 +81,7 @@ class Things:
             "sizes": (1e-3, 3e-4, 1e-4), "could_measure": {angle: 0.1}, "limits": {"F": 1.0},
             "joints": {"A": (-1, 0), "B": (0, 0.1), "C": (1, 0)}, "bars": [("A", "B"), ("B", "C")],
             "members": [("A", "B"), ("B", "C")], "supports": {"A": "xy", "C": "xy"},
+            "way_points": [{"F": 0.2}], "variables": {"B": (0.4, 2.5)}, "energy": "x**4",
         }  # fmt: skip
 
     def of_kind(self, kind: Any) -> Any:
@@ -92,6 +94,7 @@ class Things:
             em.LimitLoadMap: self.map, em.Route: self.route, em.Path: self.path,
             em.TraceOptions: em.TraceOptions(), em.SamplingOptions: em.SamplingOptions(),
             em.LoadLimit: em.LoadLimit(self.state, "F"),
+            em.Rates: em.Rates({"F": 1.0, "x_l": 1.0, "k": 1.0}), Extreme: em.peak(angle),
             em.Disc: em.Disc((0.0, 0.0), 1.0), em.charts.Rule: em.charts.lowest(angle),
             int: 2, float: 0.5, bool: False, str: "angle",
         }  # fmt: skip
@@ -102,6 +105,9 @@ class Things:
         if get_origin(kind) is Sequence:
             inside = self.right("", get_args(kind)[0])
             return MISSING if inside is MISSING else [inside]
+        if get_origin(kind) is Mapping:
+            inside = self.of_kind(flat(get_args(kind)[1])[0])
+            return MISSING if inside is MISSING else {"F": inside}
         return np.array if get_origin(kind) is Callable else MISSING
 
 
