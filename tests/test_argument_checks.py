@@ -315,6 +315,32 @@ def test_what_belongs_to_another_structure_is_refused():
     assert em.lift(state, {"F": 0.1}, within=[em.Spring().angle <= 9.0]).arrived
 
 
+def test_what_signatures_do_not_tell_of_a_design_is_refused(things):
+    """Families and bounds that take other variables or return other things, texts as bounds."""
+    limit, bounds, correlated = (
+        em.LoadLimit(things.state, "F"),
+        {"stiffness": (1.0, 2.0)},
+        np.eye(3),
+    )
+    wrong = [
+        (em.design, (em.Spring, {"C": (1.0, 2.0)}, limit)),
+        (em.design, (em.Spring, {"": (1.0, 2.0)}, limit)),
+        (em.design, (lambda stiffness: stiffness, bounds, limit)),
+        (em.design, (em.Spring, {"stiffness": ("1", "2")}, limit)),
+        (em.design, (em.Spring, bounds, [])),
+        (em.LoadLimit, (things.state, "no such load")),
+        (em.StateValue, (things.state, em.peak(things.rod.max_curvature))),
+        (em.Errors, ({"F": 0.1, "k": 0.1}, 0.9, [[1.0, 0.0], [0.0]])),
+        (em.Errors, ({"F": 0.1, "k": 0.1}, 0.9, correlated)),
+    ]
+    functions = (lambda B: B, lambda stiffness: "text", lambda stiffness: 1j)
+    of = [[em.DesignBound(each, 0.0, 1.0)] for each in functions]
+    for call, given in [*wrong, *((em.design, (em.Spring, bounds, limit, each)) for each in of)]:
+        with unchecked(), pytest.raises(InputError, match="; got ") as refused:
+            call(*given)
+        assert "\n" not in str(refused.value)
+
+
 @pytest.mark.parametrize("value", [1, np.float32(0.5), np.int64(2), np.array(0.5)])
 def test_real_numbers_of_all_types_are_numbers(value):
     """Zero-dimensional arrays become numbers."""

@@ -41,7 +41,7 @@ OWNERS: Mapping[str, Callable[[Any], Any]] = {
     "Reach": attrgetter("whole.structure"),
 }
 """How the structure is found to which objects of a class belong, by the name of the class."""
-DESCRIBED = frozenset(("Descriptor", "Constraint"))
+DESCRIBED = frozenset(("Descriptor", "Constraint", "Extreme"))
 """Classes whose objects describe one structure, by its signature."""
 CHECKED = "_arguments_are_checked"
 """Attribute of functions whose arguments are checked, and of what wraps them."""
@@ -238,13 +238,10 @@ def structures_in(value: Any) -> Iterator[Any]:
 
 
 def descriptors_in(value: Any) -> Iterator[Any]:
-    """Descriptors in an argument: alone, in constraints, in lists or as keys."""
+    """Descriptors in an argument: alone, in constraints and extremes, in lists or as keys."""
     for each in value if is_mapping(value) or is_listed(value) else (value,):
-        name = type(each).__name__
-        if name == "Constraint":
-            yield each.descriptor
-        elif name == "Descriptor":
-            yield each
+        if type(each).__name__ in DESCRIBED:
+            yield getattr(each, "descriptor", each)
 
 
 def _mappings(value: Any) -> list[Mapping[Any, Any]]:

@@ -186,10 +186,17 @@ def _array(annotation: Any, _: str) -> Kind:
         return fixed <= value.ndim <= most and bool(np.isfinite(value).all())
 
     words = f"an array of finite numbers ({', '.join(dims)})"
-    return Kind(words, "arrays of numbers", fits, lambda value: _as_array(value, numeric))
+    return Kind(words, "arrays of numbers", fits, lambda value: as_array(value, numeric))
 
 
-def _as_array(value: Any, numeric: str) -> np.ndarray:
+def as_array(value: Any, numeric: str = "iuf") -> np.ndarray:
+    """Array of numbers; texts, complex numbers and truth values are none.
+
+    Raises
+    ------
+    TypeError, ValueError
+        For anything else, and lists of unlike lengths.
+    """
     if isinstance(value, str | Mapping):
         raise TypeError
     array = np.asarray(value)

@@ -84,7 +84,7 @@ RANGES: Mapping[str, Range] = {
     "checks": count(0, 100_000),
     "retries": count(0, 20),
     **dict.fromkeys(("samples", "frames"), count(2)),
-    **dict.fromkeys(("starts", "runs", "trials", "batch", "fps", "cycles"), count(1)),
+    **dict.fromkeys(("starts", "runs", "trials", "batch", "fps", "cycles", "rebuilds"), count(1)),
     "count": count(1, 10_000),
     "limit": count(1, 100 * MANY),
     "lifts": count(1, 100 * MANY),

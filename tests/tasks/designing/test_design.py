@@ -130,6 +130,13 @@ def test_a_design_that_cannot_obey_its_bounds_is_infeasible():
     assert "violated" in found.why
 
 
+def test_a_load_without_a_limit_stays():
+    """The spring does not snap from a length above 1; nothing is better than no limit."""
+    question = em.LoadLimit(em.Spring().natural_state(x_l=1.2), "F")
+    found = em.design(em.Spring, {"stiffness": (1.0, 2.0)}, question)
+    assert (found.status, found.value, found.rebuilds) == ("found", 100.0, 1)
+
+
 def test_a_question_without_an_answer_at_the_start_says_why():
     """On the symmetric path the arch ends at a branch point, which has no derivative."""
     first = arch([0.0] * 3, [1.0] * 3)

@@ -7,9 +7,10 @@ from typing import Annotated, Any
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
+from equimorph.argument_kinds import as_array, short
 from equimorph.array_types import Float
 from equimorph.errors import InputError
-from equimorph.tasks.designing.family import DesignFamily, Vector
+from equimorph.tasks.designing.family import DesignFamily, Vector, check_names
 from equimorph.tasks.designing.questions import LoadLimit, StateValue
 from equimorph.tasks.designing.routes import RouteExtreme
 
@@ -132,7 +133,12 @@ class VariableBounds:
 
 
 def _numbers(function: Any, values: Mapping[str, Any]) -> np.ndarray:
-    found = np.asarray(function(**values), float).ravel()
-    if not np.isfinite(found).all():
-        raise InputError(f"`of` must return finite numbers; got {found} at {dict(values)}.")
-    return found
+    check_names(function, values, "of")
+    found = function(**values)
+    try:
+        numbers = as_array(found).ravel()
+    except (TypeError, ValueError):
+        numbers = np.array([np.nan])
+    if not np.isfinite(numbers).all():
+        raise InputError(f"`of` must return finite numbers; got {short(found)}.")
+    return numbers

@@ -132,6 +132,8 @@ class Bundle:
                 constraints.append(_on_variables(kind, function, plain))
         slack = max(self.excess(x), 0.0)
         self.restoring = slack > FEASIBLE
+        if not (self.objective or self.restoring):
+            return x
         start = np.concatenate([x, [self.level(x) / self.scale, slack]])
         goal = np.append(np.zeros(k), [0.0, 1.0] if self.restoring else [1.0, PENALTY])
         found = minimize(

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
+from equimorph.argument_kinds import short
 from equimorph.errors import InputError
 from equimorph.structures import State, Structure
 from equimorph.tasks.designing.bounds import Asked, DesignBound
@@ -161,7 +162,8 @@ def problem_of(
     own = (objective,) if isinstance(objective, Asked) else tuple(objective)
     if len({each.sign for each in own}) != 1:
         raise InputError(
-            "`objective` must be one or more questions, all of which are made small or all large."
+            "`objective` must be one or more questions, all of which are made small or all large; "
+            f"got {short(objective)}."
         )
     made = DesignProblem(read, own, tuple(within), tolerance)
     for question, _ in made.questions:

@@ -1,12 +1,13 @@
 """Families of structures: variables with bounds, the structure of each choice, carried states."""
 
+import inspect
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Any
 
 import numpy as np
 
-from equimorph.argument_kinds import short
+from equimorph.argument_kinds import as_array, short
 from equimorph.array_types import Float
 from equimorph.arrays import Lanes, Parameters
 from equimorph.errors import InputError
@@ -54,11 +55,13 @@ class DesignFamily:
         Raises
         ------
         InputError
-            If there is none, bounds are not finite with low < high, or a start lies outside.
+            If there is none, `make` does not take their names, bounds are not finite with
+            low < high, or a start lies outside.
         """
         if not variables:
             raise InputError("`variables` must name at least one variable; got none.")
         read = [_read_bounds(name, given) for name, given in variables.items()]
+        check_names(make, variables, "family")
         low, high, start = (np.concatenate([each[k].ravel() for each in read]) for k in range(3))
         shapes = tuple(each[0].shape for each in read)
         width = high - low
@@ -122,6 +125,21 @@ class DesignFamily:
         return by_data(value, lambda h: self.structure(x + h * unit), 1.0, joined, ways)
 
 
+def check_names(function: Callable[..., Any], variables: Mapping[str, Any], name: str) -> None:
+    """Refuse a function, called `name`, that does not take variables by their names."""
+    try:
+        signature = inspect.signature(function)
+    except ValueError:  # compiled ones may have none
+        return
+    try:
+        signature.bind(**variables)
+    except TypeError as error:
+        raise InputError(
+            f"`{name}` must be a function of {', '.join(map(str, variables))}; got one of "
+            f"{signature}."
+        ) from error
+
+
 @dataclass(frozen=True)
 class Carried:
     """Unknowns and parameters, or changes of these (lanes)."""
@@ -144,8 +162,8 @@ def _read_bounds(name: str, given: Any) -> tuple[np.ndarray, np.ndarray, np.ndar
     """Lower bound, upper bound and start of one variable, of one shape."""
     wanted = f"`{name}` must have finite bounds (low, high) or (low, high, start), low < high"
     try:
-        low, high, *rest = (np.asarray(each, float) for each in given)
-        start = rest[0] if rest else 0.5 * (low + high)
+        low, high, *rest = map(as_array, given)
+        start = rest[0] if rest else low + 0.5 * (high - low)
         low, high, start = (np.array(each) for each in np.broadcast_arrays(low, high, start))
     except (TypeError, ValueError) as error:
         raise InputError(f"{wanted}; got {short(given)}.") from error

@@ -135,6 +135,10 @@ class LoadLimit:
     bound: float | None = None
     sign: float = field(default=-1.0, init=False)
 
+    def __post_init__(self) -> None:
+        """Check the name of the load."""
+        position(self.start.structure.parameters, self.load)
+
     @property
     def states(self) -> tuple[State, ...]:
         """The start of the path."""

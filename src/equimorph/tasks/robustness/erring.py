@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
+from equimorph.argument_kinds import as_array, short
 from equimorph.array_types import Float
 from equimorph.arrays import Lanes, Parameters
 from equimorph.equilibria import settle
@@ -81,13 +82,11 @@ class Errors:
             raise InputError("`sizes` must name at least one error; got none.")
         if self.correlation is None:
             return
-        matrix, count = np.array(self.correlation, float), len(self.sizes)
-        right = matrix.shape == (count, count) and np.array_equal(matrix, matrix.T)
-        right = right and np.allclose(np.diag(matrix), 1.0)
-        if self.probability is None or not (right and np.linalg.eigvalsh(matrix)[0] > 0.0):
+        count = len(self.sizes)
+        if self.probability is None or not _is_correlation(self.correlation, count):
             raise InputError(
                 f"`correlation` must be a correlation matrix of {count} errors, positive definite "
-                f"with ones on its diagonal, beside a probability; got {self.correlation!r}."
+                f"with ones on its diagonal, beside a probability; got {short(self.correlation)}."
             )
 
     def __repr__(self) -> str:
@@ -119,6 +118,16 @@ class Errors:
         """The same errors, larger or smaller."""
         sizes = {name: factor * float(size) for name, size in self.sizes.items()}
         return Errors(sizes, self.probability, self.correlation, self.trials, self.seed)
+
+
+def _is_correlation(given: Sequence[Sequence[float]], count: int) -> bool:
+    try:
+        matrix = as_array(given)
+    except (TypeError, ValueError):
+        return False
+    right = matrix.shape == (count, count) and np.array_equal(matrix, matrix.T)
+    right = right and np.allclose(np.diag(matrix), 1.0)
+    return right and bool(np.linalg.eigvalsh(matrix)[0] > 0.0)
 
 
 def errors_of(given: Mapping[str, float] | Errors) -> Errors:
