@@ -292,7 +292,10 @@ WRONG = [
         lambda: em.Rod(loads={"p": em.Pressure()}).lateral_margin(0.7, 1.0),
         "`torsion`, `lateral` must be left out for rods under the pressure `p`",
     ),
-    (lambda: em.Rod().descriptor("lateral_margin(0.7)"), "must have none or two stiffnesses"),
+    (
+        lambda: em.Rod().descriptor("lateral_margin(0.7)"),
+        "lateral_index(torsion,lateral)",
+    ),
 ]
 
 

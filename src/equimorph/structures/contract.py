@@ -51,8 +51,10 @@ class Symmetry:
         return np.asarray(self.signs * (p if self.order is None else p[..., self.order]))
 
 
-_CALL = re.compile(r"(\w+)(?:\(([\w,-]+)\))?")
+_CALL = re.compile(r"\s*(\w+)\s*(?:\(([^()]*)\))?\s*")
 """Text of a descriptor: its name, and its arguments in parentheses if it has some."""
+Written = Mapping[str, str | Callable[..., Descriptor]]
+Readers = Mapping[str, Callable[[str], Any]]
 Velocities = Float[np.ndarray, "lanes k unknowns"]
 Product = Callable[[Velocities], Velocities]
 INERTIA_DIFFERENCE = 1e-5
@@ -296,12 +298,14 @@ class Structure(Rebuilt, Equations):
         del z, p
         return Drawing()
 
-    written: ClassVar[Mapping[str, str]] = {"energy": "total_energy"}
-    """Properties and methods that make descriptors, by the texts that mean these.
+    written: ClassVar[Written] = {"energy": "total_energy"}
+    """Properties, methods or functions that make descriptors, by the texts that mean these.
 
     Like ``{"energy": "total_energy", "displacement(joint,axis)": "displacement"}``: the arguments
-    in a text are given to the method as texts.
+    in a text are given to the method as `readers` read them.
     """
+    readers: ClassVar[Readers] = {}
+    """How arguments in such a text are read, by their names there; as texts by default."""
     energy_unit: str = "energy"
     """Unit of the descriptor ``energy``."""
 
@@ -311,14 +315,17 @@ class Structure(Rebuilt, Equations):
 
         Every structure knows ``energy``, which reports show.
         """
-        found = _CALL.fullmatch(re.sub(r"\s", "", text))
+        found = _CALL.fullmatch(text)
         name, inner = found.groups() if found else ("", None)
-        given = inner.split(",") if inner else []
+        given = [each.strip() for each in inner.split(",")] if inner and inner.strip() else []
         for form, maker in self.written.items():
-            called, _, needed = form.partition("(")
-            if called == name and len(needed.split(",")) * bool(needed) == len(given):
-                made = getattr(self, maker)
-                return made if isinstance(made, Descriptor) else made(*given)
+            called, _, needed = form.rstrip(")").partition("(")
+            kinds = needed.split(",") if needed else []
+            if called == name and len(kinds) == len(given):
+                pairs = zip(kinds, given, strict=True)
+                values = [self.readers.get(kind, _without_spaces)(each) for kind, each in pairs]
+                made = maker(self, *values) if callable(maker) else getattr(self, maker)
+                return made if isinstance(made, Descriptor) else made(*values)
         written = tuple(self.written)
         raise InputError(
             f"`descriptor` must be one of {', '.join(written)}; got {text!r}."
@@ -372,3 +379,7 @@ class Structure(Rebuilt, Equations):
         """Independent movements out of the plane that lower the energy; None: not judged."""
         del z, p
         return None
+
+
+def _without_spaces(text: str) -> str:
+    return re.sub(r"\s", "", text)

@@ -1,6 +1,5 @@
 """What rods in the plane and in space have in common, in the user's units."""
 
-import re
 from abc import abstractmethod
 from collections.abc import Callable, Mapping
 from functools import cached_property
@@ -12,12 +11,12 @@ from equimorph.argument_checks import check_arguments
 from equimorph.argument_vocabulary import SHARE
 from equimorph.array_types import Float, Int
 from equimorph.arrays import Flags, Lanes, Parameters, Sides, Values
-from equimorph.errors import InputError, suggestion
+from equimorph.errors import InputError
 from equimorph.linalg import BorderedSolution
 from equimorph.linalg.intervals import Interval
 from equimorph.model import Descriptor, remember_call
 from equimorph.structures.approach import smooth_arcs
-from equimorph.structures.contract import Symmetry
+from equimorph.structures.contract import Readers, Symmetry, Written
 from equimorph.structures.equations import (
     Advance,
     AnyBorder,
@@ -46,8 +45,6 @@ COORDINATES = ("x", "height", "z")
 """Names of the descriptors of coordinates."""
 FRACTIONS = (3, 6, 7, 9, 11, 12)
 """Denominators of arclengths that descriptors write as fractions."""
-CALL = re.compile(r"\s*(\w+)\s*(?:\(\s*([^()]*?)\s*\))?\s*")
-"""Text of a descriptor: its name, and its argument in parentheses if it has one."""
 _SYMBOLS = {0.5: "½", 1 / 3: "1/3", 2 / 3: "2/3", 0.25: "¼", 0.75: "¾"}
 
 Arclengths = Float[np.ndarray, " points"]
@@ -65,6 +62,11 @@ def read_fraction(text: str) -> float:
         return float(above) / float(below or 1.0)
     except (ValueError, ZeroDivisionError):
         raise InputError(f"`s` must be a number or a fraction like 1/3; got {text!r}.") from None
+
+
+def read_end(text: str) -> int | str:
+    """End 0 or 1 of a rod; another text as it is, which is refused."""
+    return int(text) if text in ("0", "1") else text
 
 
 def name_at(name: str, s: float) -> str:
@@ -87,8 +89,13 @@ class AnyRod(HeavyRod):
     """
 
     endless_in: ClassVar[str] = "max_curvature"
-    forms: ClassVar[tuple[str, ...]]
-    """Descriptors as texts, for error messages."""
+    written: ClassVar[Written] = {
+        "max_curvature": "max_curvature",
+        "energy": "total_energy",
+        "clearance(s)": "clearance",
+        "support_force(x)": "support_force",
+    }
+    readers: ClassVar[Readers] = {"s": read_fraction, "0": read_end}
     mechanics: RodMechanics
     units: Units
     space_options: SpaceOptions
@@ -363,28 +370,3 @@ class AnyRod(HeavyRod):
         if distance > max(thickness, TOUCHING * self.units.value("length")):
             return ()
         return (f"the rod touches itself: points come as near as {distance:.3g}",)
-
-    @check_arguments
-    def descriptor(self, text: str) -> Descriptor:
-        """Return the descriptor written like ``height(0.5)`` or ``max_curvature``."""
-        call = CALL.fullmatch(text)
-        made = None if call is None else self._descriptor_of_name(call[1], call[2])
-        if made is None:
-            raise InputError(
-                f"`descriptor` must be one of {', '.join(self.forms)}; got {text!r}."
-                f"{suggestion(text, self.forms)}"
-            )
-        return made
-
-    def _descriptor_of_name(self, name: str, argument: str | None) -> Descriptor | None:
-        if argument is None and name in ("max_curvature", "energy"):
-            return self.max_curvature if name == "max_curvature" else self.total_energy
-        if argument is not None and name == "support_force":
-            return self.support_force(argument)
-        if argument is not None and name == "clearance":
-            return self.clearance(read_fraction(argument))
-        return self.own_descriptor(name, argument)
-
-    @abstractmethod
-    def own_descriptor(self, name: str, argument: str | None) -> Descriptor | None:
-        """Descriptor that only this kind of rod has; None for an unknown name."""

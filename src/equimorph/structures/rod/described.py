@@ -16,8 +16,9 @@ from equimorph.arrays import Lanes, Parameters, Values
 from equimorph.errors import InputError, MissingError
 from equimorph.model import Constraint, Descriptor, remember_call
 from equimorph.model.descriptor import Branches
+from equimorph.structures.contract import Readers, Written
 from equimorph.structures.rod import space
-from equimorph.structures.rod.any_rod import COORDINATES, Field, Peaks, read_fraction
+from equimorph.structures.rod.any_rod import AnyRod, Field, Peaks
 from equimorph.structures.rod.ends import End
 from equimorph.structures.rod.extrema import extreme_curvatures, peaks, stations
 from equimorph.structures.rod.lateral import Holding, LateralStiffness, OutOfPlane
@@ -99,12 +100,26 @@ FORCES = {"x": 0, "y": 1, "lambda": 0, "mu": 1}
 class Described(Measured):
     """A planar rod with its descriptors, in the user's units."""
 
-    forms: ClassVar[tuple[str, ...]] = (
-        *("height(s)", "x(s)", "angle(s)", "curvature(s)", "max_curvature", "energy"),
-        *("max_strain", "max_stress", "safety_factor(strength)"),
-        *("clearance(s)", "lateral_margin", "lateral_index"),
-        *("support_force(x)", "support_force(y)", "end_moment(0)", "end_moment(1)"),
-    )
+    written: ClassVar[Written] = {
+        "height(s)": "height",
+        "x(s)": lambda rod, s: rod.coordinate(0, s),
+        "angle(s)": "angle",
+        "curvature(s)": "curvature",
+        **AnyRod.written,
+        "max_strain": "max_strain",
+        "max_stress": "max_stress",
+        "safety_factor(strength)": "safety_factor",
+        "lateral_margin": "lateral_margin",
+        "lateral_margin(torsion,lateral)": "lateral_margin",
+        "lateral_index": "lateral_index",
+        "lateral_index(torsion,lateral)": "lateral_index",
+        "end_moment(0)": "end_moment",
+    }
+    readers: ClassVar[Readers] = {
+        **AnyRod.readers,
+        **dict.fromkeys(("torsion", "lateral"), space.number_or_text),
+        "strength": str,
+    }
 
     @property
     @abstractmethod
@@ -236,28 +251,6 @@ class Described(Measured):
     def support_reactions(self) -> tuple[Descriptor, ...]:
         """Both components of the force at A, and the couples at both ends."""
         return (*map(self.support_force, "xy"), *map(self.end_moment, (0, 1)))
-
-    def own_descriptor(self, name: str, argument: str | None) -> Descriptor | None:
-        """Descriptor of a planar rod by its name and argument."""
-        if name in ("lateral_index", "lateral_margin"):
-            make = self.lateral_index if name == "lateral_index" else self.lateral_margin
-            return make(*space.stiffness_arguments(argument))
-        if name in ("max_strain", "max_stress", "safety_factor"):
-            return self._stress_descriptor(name, argument)
-        if argument in ("0", "1") and name == "end_moment":
-            return self.end_moment(int(argument))
-        if argument is None or name not in ("x", "height", "angle", "curvature"):
-            return None
-        s = read_fraction(argument)
-        if name in ("x", "height"):
-            return self.coordinate(COORDINATES.index(name), s)
-        return self.angle(s) if name == "angle" else self.curvature(s)
-
-    def _stress_descriptor(self, name: str, argument: str | None) -> Descriptor | None:
-        if name == "safety_factor":
-            return None if argument is None else self.safety_factor(argument)
-        plain = {"max_strain": lambda: self.max_strain, "max_stress": lambda: self.max_stress}
-        return plain[name]() if argument is None else None
 
     # --- out of the plane -------------------------------------------------------------------
 

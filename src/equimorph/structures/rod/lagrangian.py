@@ -1,15 +1,18 @@
 """What the Lagrangians of rods in the plane and in space have in common."""
 
-from abc import ABC, abstractmethod
+from abc import ABC
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Self
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 
 from equimorph.array_types import Float
 from equimorph.structures.rod.discretisation import Mesh
 from equimorph.structures.rod.ends import FREE, Axis, compliance
+
+Rows = Float[np.ndarray, "axes scalars"]
+Model = TypeVar("Model", bound="RodLagrangian")
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,6 +36,11 @@ class RodLagrangian(ABC):
         the scalars.
     """
 
+    rows: ClassVar[tuple[str, ...]]
+    """Further fields whose first axis counts the scalars."""
+    last: ClassVar[tuple[str, ...]]
+    """Further fields whose last axis counts the scalars."""
+
     mesh: Mesh
     names: tuple[str, ...]
     multipliers: int
@@ -47,14 +55,23 @@ class RodLagrangian(ABC):
         """Number of multipliers and parameters, and 1 for the constant."""
         return self.multipliers + len(self.names) + 1
 
-    @abstractmethod
     def map_scalars(
-        self, names: Sequence[str], matrix: Float[np.ndarray, "scalars others"]
-    ) -> Self:
+        self: Model, names: Sequence[str], matrix: Float[np.ndarray, "scalars others"]
+    ) -> Model:
         """The same rod in new parameters ``y``, of which its scalars are ``matrix @ y``."""
+        quadratic = matrix.T @ self.quadratic @ matrix
+        mapped: dict[str, Any] = {each: map_rows(matrix, getattr(self, each)) for each in self.rows}
+        mapped |= {
+            each: getattr(self, each) @ matrix for each in ("reaction", "origin", *self.last)
+        }
+        return replace(self, names=tuple(names), quadratic=quadratic, **mapped)
 
 
-Rows = Float[np.ndarray, "axes scalars"]
+def map_rows(
+    matrix: Float[np.ndarray, "scalars others"], rows: Float[np.ndarray, "scalars ..."]
+) -> Float[np.ndarray, "others ..."]:
+    """Coefficients of the scalars ``matrix @ y`` as coefficients of y."""
+    return np.asarray(np.einsum("jk,j...->k...", matrix, rows))
 
 
 @dataclass(frozen=True, eq=False)

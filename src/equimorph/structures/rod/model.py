@@ -3,13 +3,19 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 
 from equimorph.array_types import Bool, Float, Int
 from equimorph.structures.rod.discretisation import Mesh, reference_element
 from equimorph.structures.rod.ends import FREE, HELD, Axis, End, support_axes
-from equimorph.structures.rod.lagrangian import RodLagrangian, SupportEnergy, support_energy
+from equimorph.structures.rod.lagrangian import (
+    RodLagrangian,
+    SupportEnergy,
+    map_rows,
+    support_energy,
+)
 from equimorph.structures.rod.pressure import closing
 from equimorph.structures.rod.profiles import LoadShape, at_nodes
 from equimorph.structures.rod.terms import Effects, Term
@@ -54,9 +60,8 @@ class Densities:
 
     def map_scalars(self, matrix: Float[np.ndarray, "scalars others"]) -> "Densities":
         """The densities for new scalars ``y``, of which the present ones are ``matrix @ y``."""
-        rows = (self.along, self.across, self.bending, self.tension, self.torsion)
-        a, b, c, d, e = (np.einsum("jk,jei->kei", matrix, row) for row in rows)
-        return Densities(a, b, c, d, e, self.rigidity, self.softness)
+        rows = ("along", "across", "bending", "tension", "torsion")
+        return replace(self, **{each: map_rows(matrix, getattr(self, each)) for each in rows})
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,6 +87,9 @@ class RodModel(RodLagrangian):
     closing
         Q of V, see `pressure.closing`.
     """
+
+    rows: ClassVar[tuple[str, ...]] = ("slope", "element_slope")
+    last: ClassVar[tuple[str, ...]] = ("turned", "rest", "pressure")
 
     stiffness: Float[np.ndarray, "elements order order"]
     bending_stiffness: Float[np.ndarray, "elements order order"]
@@ -122,20 +130,8 @@ class RodModel(RodLagrangian):
         self, names: Sequence[str], matrix: Float[np.ndarray, "scalars others"]
     ) -> "RodModel":
         """The same rod in new parameters ``y``, of which its scalars are ``matrix @ y``."""
-        return replace(
-            self,
-            names=tuple(names),
-            nodal=self.nodal.map_scalars(matrix),
-            fine=self.fine.map_scalars(matrix),
-            slope=matrix.T @ self.slope,
-            element_slope=np.einsum("jk,jei->kei", matrix, self.element_slope),
-            quadratic=matrix.T @ self.quadratic @ matrix,
-            turned=self.turned @ matrix,
-            rest=self.rest @ matrix,
-            reaction=self.reaction @ matrix,
-            origin=self.origin @ matrix,
-            pressure=self.pressure @ matrix,
-        )
+        nodal, fine = (each.map_scalars(matrix) for each in (self.nodal, self.fine))
+        return replace(super().map_scalars(names, matrix), nodal=nodal, fine=fine)
 
 
 def raw_names(ends: tuple[End, End], terms: Mapping[str, Sequence[Term]]) -> tuple[str, ...]:
@@ -164,10 +160,17 @@ def raw_model(build: Build) -> RodModel:
     slope = np.zeros((count, len(mesh.nodes)))
     for e, nodes in enumerate(mesh.element_nodes):
         slope[:, nodes] += element_slope[:, e]
-    _add_couples(build, place, slope)
-    quadratic = _curvature_energy(build, place, count)
-    supports = _supports(build, axes, place, count)
-    quadratic += supports.quadratic
+    natural = np.zeros_like(nodal.bending)
+    natural[-1] = at_nodes(build.curvature, mesh)
+    forces, pressure = np.zeros((count, 2)), np.zeros(count)
+    for name, terms in build.terms.items():
+        row, effects = place[name], _sum_effects(terms, mesh)
+        natural[row], forces[row], pressure[row] = effects.natural, effects.force, effects.pressure
+        for s, moment in effects.couples:
+            slope[row, int(np.argmin(np.abs(mesh.nodes - s)))] += moment
+    supports = _supports(build, axes, place, forces)
+    # ∫ B κ_j κ_k of the intrinsic curvatures is the energy of a straight rod
+    quadratic = supports.quadratic + np.einsum("jei,ei,kei->jk", natural, weighted, natural)
     stiffness, springs = bending.copy(), np.zeros(2)
     turned, rest = np.zeros((2, 2, count))
     for side, (name, node) in enumerate((("theta_A", 0), ("theta_B", -1))):
@@ -197,7 +200,7 @@ def raw_model(build: Build) -> RodModel:
         turned=turned,
         springs=springs,
         rest=rest,
-        pressure=_pressure(build, place, count),
+        pressure=pressure,
         closing=closing(
             (_moves(axes, 0), _moves(axes, 1)), float(np.arctan2(axes[0].unit[1], axes[0].unit[0]))
         ),
@@ -213,15 +216,11 @@ def _sum_effects(terms: Sequence[Term], mesh: Mesh) -> Effects:
     """Effects of several terms with one amplitude."""
     parts = [term.effects(mesh) for term in terms]
     zero = np.zeros((mesh.elements, mesh.degree + 1))
+    fields = ("along", "across", "bending", "natural", "tension", "torsion")
     return Effects(
-        along=sum((part.along for part in parts), zero),
-        across=sum((part.across for part in parts), zero),
-        bending=sum((part.bending for part in parts), zero),
-        natural=sum((part.natural for part in parts), zero),
+        **{each: sum((getattr(part, each) for part in parts), zero) for each in fields},
         couples=tuple(couple for part in parts for couple in part.couples),
         pressure=sum(part.pressure for part in parts),
-        tension=sum((part.tension for part in parts), zero),
-        torsion=sum((part.torsion for part in parts), zero),
         force=(sum(part.force[0] for part in parts), sum(part.force[1] for part in parts)),
     )
 
@@ -254,46 +253,17 @@ def _densities(
     return Densities(along, across, bending, tension, torsion, rigidity, softness)
 
 
-def _add_couples(
-    build: Build, place: Mapping[str, int], slope: Float[np.ndarray, "scalars nodes"]
-) -> None:
-    for name, terms in build.terms.items():
-        for s, moment in _sum_effects(terms, build.mesh).couples:
-            node = int(np.argmin(np.abs(build.mesh.nodes - s)))
-            slope[place[name], node] += moment
-
-
-def _pressure(build: Build, place: Mapping[str, int], count: int) -> Float[np.ndarray, " scalars"]:
-    out = np.zeros(count)
-    for name, terms in build.terms.items():
-        out[place[name]] = _sum_effects(terms, build.mesh).pressure
-    return out
-
-
-def _curvature_energy(
-    build: Build, place: Mapping[str, int], count: int
-) -> Float[np.ndarray, "scalars scalars"]:
-    """∫ B κ_j κ_k of the intrinsic curvatures: the energy of a straight rod."""
-    mesh = build.mesh
-    natural = np.zeros((count, mesh.elements, mesh.degree + 1))
-    natural[-1] = at_nodes(build.curvature, mesh)
-    for name, terms in build.terms.items():
-        natural[place[name]] = _sum_effects(terms, mesh).natural
-    weights = mesh.element_weights * at_nodes(build.stiffness, mesh) / FOUR_PI_SQUARED
-    return np.asarray(np.einsum("jei,ei,kei->jk", natural, weights, natural))
-
-
 def _supports(
-    build: Build, axes: Sequence[Axis], place: Mapping[str, int], count: int
+    build: Build,
+    axes: Sequence[Axis],
+    place: Mapping[str, int],
+    forces: Float[np.ndarray, "scalars 2"],
 ) -> SupportEnergy:
     """Energy of the supports; the rod begins at the end that does not slide."""
-    forces = np.zeros((count, 2))
-    for name, terms in build.terms.items():
-        forces[place[name]] = _sum_effects(terms, build.mesh).force
     out = support_energy(axes, forces, place)
     if build.ends[0].slide is None:
         return out
-    site = np.zeros(count)  # end B, whose place across the line is given
+    site = np.zeros(len(forces))  # end B, whose place across the line is given
     site[place[axes[1].name]] = 1.0
     return replace(out, origin=np.outer(axes[1].unit, site), from_start=(False, False))
 

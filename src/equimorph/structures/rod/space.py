@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
 
 import numpy as np
 
@@ -228,24 +227,8 @@ def lateral_margin(
     )
 
 
-def stiffness_arguments(text: str | None) -> list[Any]:
-    """Stiffnesses in a descriptor's text: two numbers or texts with units, or none.
-
-    Raises
-    ------
-    InputError
-        For another number of them.
-    """
-    parts = [part.strip() for part in (text or "").split(",") if part.strip()]
-    if len(parts) not in (0, 2):
-        raise InputError(
-            f"`lateral_margin`, `lateral_index` must have none or two stiffnesses, torsion and "
-            f"lateral; got {text!r}."
-        )
-    return [_number_or_text(part) for part in parts]
-
-
-def _number_or_text(part: str) -> float | str:
+def number_or_text(part: str) -> float | str:
+    """Stiffness as a number, or as a text with its unit."""
     try:
         return float(part)
     except ValueError:

@@ -10,14 +10,13 @@ from equimorph.array_types import Float
 from equimorph.arrays import Lanes, Parameters, Values, Velocity
 from equimorph.errors import InputError
 from equimorph.model import Descriptor, remember_call
+from equimorph.structures.contract import Written
 from equimorph.structures.places_inertia import MaterialPoints
 from equimorph.structures.rod.any_rod import (
-    COORDINATES,
     AnyRod,
     Arclengths,
     Field,
     arclengths,
-    read_fraction,
 )
 from equimorph.structures.rod.centreline import Centreline
 from equimorph.structures.spatial.fields import Fields, SpatialFields
@@ -39,12 +38,16 @@ FORCES = {"lambda": 0, "mu": 1, "x": 0, "y": 1, "z": 2}
 class DescribedInSpace(AnyRod):
     """A rod in space with its fields and descriptors, in the user's units."""
 
-    forms: ClassVar[tuple[str, ...]] = (
-        *("height(s)", "x(s)", "z(s)", "turn(s)", "tilt(s)", "roll(s)"),
-        *("curvature(s)", "side_curvature(s)", "twist(s)", "bending(s)", "max_curvature"),
-        *("energy", "clearance(s)", "support_force(x)", "end_couple(0, x)"),
-    )
-
+    written: ClassVar[Written] = {
+        "height(s)": "height",
+        "x(s)": lambda rod, s: rod.coordinate(0, s),
+        "z(s)": lambda rod, s: rod.coordinate(2, s),
+        **{f"{name}(s)": lambda rod, s, name=name: rod._angle(name, s) for name in ANGLES},
+        **{f"{name}(s)": lambda rod, s, name=name: rod._strain(name, s) for name in STRAINS},
+        "bending(s)": "bending",
+        **AnyRod.written,
+        "end_couple(0,x)": "end_couple",
+    }
     mechanics: SpatialMechanics
 
     @cached_property
@@ -219,20 +222,3 @@ class DescribedInSpace(AnyRod):
                     "turn the clamp about the same axis there, and one direction is missing"
                 )
         return tuple(found)
-
-    def own_descriptor(self, name: str, argument: str | None) -> Descriptor | None:
-        """Descriptor of a rod in space by its name and argument."""
-        if argument is None:
-            return None
-        if name == "end_couple":
-            end, _, component = argument.partition(",")
-            number = int(end) if end.strip() in ("0", "1") else -1
-            return self.end_couple(number, component.strip())
-        if name not in (*COORDINATES, *STRAINS, *ANGLES, "bending"):
-            return None
-        at = read_fraction(argument)
-        if name in COORDINATES:
-            return self.coordinate(COORDINATES.index(name), at)
-        if name in STRAINS:
-            return self._strain(name, at)
-        return self._angle(name, at) if name in ANGLES else self.bending(at)

@@ -1,8 +1,9 @@
 """The Lagrangian of a rod in space as constant arrays."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 
@@ -157,6 +158,9 @@ class SpatialModel(RodLagrangian):
         Angles (a, b, τ) of clamps A and B as combinations of the scalars.
     """
 
+    rows: ClassVar[tuple[str, ...]] = ("force", "moment", "tension", "torsion")
+    last: ClassVar[tuple[str, ...]] = ("turned",)
+
     stiffness: Float[np.ndarray, "elements order 3"]
     softness: Float[np.ndarray, "elements order 3"]
     force: Rows
@@ -175,27 +179,6 @@ class SpatialModel(RodLagrangian):
         """Nodes whose rotations are unknown."""
         count = len(self.mesh.nodes)
         return slice(int(self.held[0]), count - int(self.held[1]))
-
-    def map_scalars(
-        self, names: Sequence[str], matrix: Float[np.ndarray, "scalars others"]
-    ) -> "SpatialModel":
-        """The same rod in new parameters ``y``, of which its scalars are ``matrix @ y``."""
-
-        def mapped(rows: np.ndarray) -> np.ndarray:
-            return np.asarray(np.einsum("jk,j...->k...", matrix, rows))
-
-        return replace(
-            self,
-            names=tuple(names),
-            force=mapped(self.force),
-            moment=mapped(self.moment),
-            tension=mapped(self.tension),
-            torsion=mapped(self.torsion),
-            quadratic=matrix.T @ self.quadratic @ matrix,
-            turned=self.turned @ matrix,
-            reaction=self.reaction @ matrix,
-            origin=self.origin @ matrix,
-        )
 
 
 def raw_names(ends: Ends, terms: Mapping[str, Sequence[Term]]) -> tuple[str, ...]:
