@@ -170,6 +170,8 @@ from .manifold import (
     Components as Components,
     stability_distance as stability_distance,
     StabilityDistance as StabilityDistance,
+    network_changes as network_changes,
+    NetworkChanges as NetworkChanges,
     snap_graph as snap_graph,
     SnapGraph as SnapGraph,
 )

@@ -29,6 +29,7 @@ from equimorph.manifold.queries.levels import (
     singular_set,
 )
 from equimorph.manifold.queries.locate import Location, Place, locate
+from equimorph.manifold.queries.network_changes import NetworkChanges, network_changes
 from equimorph.manifold.queries.snap_graph import Snap, SnapGraph, snap_graph
 from equimorph.manifold.queries.stability_distance import StabilityDistance, stability_distance
 from equimorph.manifold.refining.refine import refine
@@ -47,6 +48,7 @@ __all__ = [
     "EquilibriumSet",
     "Level",
     "Location",
+    "NetworkChanges",
     "Place",
     "SetBarriers",
     "Snap",
@@ -66,6 +68,7 @@ __all__ = [
     "level_set",
     "lift_to",
     "locate",
+    "network_changes",
     "overturned_cells",
     "part",
     "refine",

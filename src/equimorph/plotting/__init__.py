@@ -15,7 +15,12 @@ from equimorph.plotting.shapes import calibration, portraits, shapes
 from equimorph.plotting.snaps import snap_panels
 from equimorph.plotting.style import house_style, save
 from equimorph.plotting.surface import surface
-from equimorph.plotting.transitions import disconnectivity, energy_path, least_barriers
+from equimorph.plotting.transitions import (
+    disconnectivity,
+    energy_path,
+    least_barriers,
+    network_changes,
+)
 from equimorph.plotting.words import words
 
 __all__ = [
@@ -37,6 +42,7 @@ __all__ = [
     "level_plane",
     "load_map",
     "margins",
+    "network_changes",
     "parameter_plane",
     "parameterisation",
     "portraits",

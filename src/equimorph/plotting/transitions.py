@@ -10,13 +10,14 @@ from equimorph.argument_checks import check_arguments
 from equimorph.array_types import Float
 from equimorph.equilibria import EnergyPath, TransitionNetwork
 from equimorph.errors import InputError
-from equimorph.manifold import EquilibriumSet
+from equimorph.manifold import EquilibriumSet, NetworkChanges
 from equimorph.plotting import style
 from equimorph.plotting.labels import with_unit
 from equimorph.plotting.maps import value_colours
 from equimorph.plotting.plane import draw_folds, frame_plane
 from equimorph.plotting.surroundings import Surroundings, frame_shapes
 from equimorph.structures import States
+from equimorph.tasks.start import check_two_parameters
 
 _TREE_ROOM, _PATH_ROOM = (0.66, 0.66, 0.1, 0.1), (0.66, 0.98, 0.1, 0.1)
 _PLANE_ROOM = (0.5, 0.42, 0.62, 0.1)
@@ -178,8 +179,7 @@ def least_barriers(
     InputError
         If the set has another number of free parameters.
     """
-    if len(eset.names) != 2:
-        raise InputError(f"`eset` must have two free parameters; got {', '.join(eset.names)}.")
+    check_two_parameters(eset)
     axes = [
         np.linspace(low, high, count)
         for low, high, count in zip(eset.box.lower, eset.box.upper, values.T.shape, strict=True)
@@ -196,6 +196,50 @@ def least_barriers(
         style.colour_bar(ax, paint, with_unit("least barrier $\\Delta E$", unit))
         style.legend_below(ax, lines, room=own)
     return ax
+
+
+@check_arguments
+def network_changes(changes: NetworkChanges, ax: Axes | None = None) -> Axes:
+    """Curves over two parameters on which the transition network changes.
+
+    Parameters
+    ----------
+    changes
+        Over two free parameters.
+    ax
+        Where to draw; None makes a figure one column wide.
+
+    Returns
+    -------
+    The axes.
+
+    Raises
+    ------
+    InputError
+        If the set has another number of free parameters.
+    """
+    eset = changes.eset
+    check_two_parameters(eset)
+    with style.house_style():
+        own = ax is None
+        ax = ax or style.new_axes(style.SINGLE_COLUMN, _HEIGHT, _TREE_ROOM)
+        frame_plane(ax, eset)
+        lines = draw_folds(ax, eset, stable_only=True)
+        for level, look in ((changes.swaps, _SWAP), (changes.passes, _PASS)):
+            at = np.stack([level.states[name] for name in eset.names], axis=1)
+            drawn = [ax.plot(*at[piece].T, **look)[0] for piece in level.pieces]
+            lines += drawn[:1]
+        style.legend_below(ax, lines, room=own)
+    return ax
+
+
+_SWAP: dict[str, Any] = {"color": _STABLE, "linewidth": 1.4, "label": "two minima swap order"}
+_PASS: dict[str, Any] = {
+    "color": _SADDLE,
+    "linewidth": 1.4,
+    "linestyle": (0, (4, 2)),
+    "label": "two lowest passes swap",
+}
 
 
 def _place(path: EnergyPath, z: Float[np.ndarray, " size"]) -> float:

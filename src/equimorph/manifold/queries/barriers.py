@@ -232,12 +232,7 @@ class SetBarriers:
         columns = dict(zip(eset.names, p[:, eset.setting.free].T.copy(), strict=True))
         over = eset.over(**columns)
         energy, stable = over.states.energy, over.index == 0
-        saddles = np.flatnonzero(over.index == 1)
-        ends, sure = self._ends(over, saddles)
-        if exact:
-            ends[~sure] = ends_of_descents(over, saddles[~sure])
-            sure[:] = True
-        ways = ways_over(saddles[sure], ends[sure], energy)
+        ways = self.ways(over, exact=exact)
         exits = np.full((len(energy), 2), NONE)
         # the last one written is the way over the lowest saddle
         exits[ways[::-1, 1]] = ways[::-1][:, [0, 2]]
@@ -247,8 +242,7 @@ class SetBarriers:
         if eset.constraints:  # beyond them there may be saddles between several minima
             several = np.bincount(over.point[stable], minlength=len(over)) > 1
             top[np.isposinf(top) & several[over.point]] = np.nan
-        _lower(over, top, saddles[~sure])
-        number = _nearest_states(over, z, top)
+        number = nearest_states(over, z, top)
         # the last row stands for no state
         top, exits = np.append(top, np.nan), np.append(exits, [[NONE, NONE]], axis=0)
         index = np.append(over.index, 0)[number]
@@ -260,6 +254,25 @@ class SetBarriers:
         met = landing >= 0
         released[met] = energy[saddle[met]] - energy[landing[met]]
         return Barriers(height, released, saddle, landing, over.states)
+
+    def ways(self, over: StatesOver, *, exact: bool) -> Int[np.ndarray, "ways 3"]:
+        """Saddle, a stable state below it, and where it leads beyond, over points; `ways_over`.
+
+        If not exact, saddles of cells in which the network changes count for every stable state
+        below them, and lead nowhere.
+        """
+        saddles, energy = np.flatnonzero(over.index == 1), over.states.energy
+        ends, sure = self._ends(over, saddles)
+        if exact:
+            ends[~sure] = ends_of_descents(over, saddles[~sure])
+            return ways_over(saddles, ends, energy)
+        rows = [ways_over(saddles[sure], ends[sure], energy)]
+        for saddle in saddles[~sure]:
+            first, last = np.searchsorted(over.point, over.point[saddle] + np.arange(2))
+            below = (over.index[first:last] == 0) & (energy[first:last] < energy[saddle])
+            rows += [np.array([[saddle, k, NONE]]) for k in first + np.flatnonzero(below)]
+        every = np.concatenate(rows)
+        return np.asarray(every[np.argsort(energy[every[:, 0]], kind="stable")])
 
     def _critical(self, z: Lanes, p: Parameters, height: Values) -> Flags:
         """Which lanes without a saddle are on the edge of stability: they are its saddle."""
@@ -338,15 +351,6 @@ def barriers(eset: EquilibriumSet, *, progress: Progress | None = None) -> SetBa
     return SetBarriers(eset, landings_of(eset, progress or Silent()))
 
 
-def _lower(over: StatesOver, top: ItemValues, saddles: Some) -> None:
-    """Lower the tops of all stable states below saddles over the same points to these saddles."""
-    energy = over.states.energy
-    for saddle in saddles[np.argsort(-energy[saddles])]:
-        own = slice(*np.searchsorted(over.point, over.point[saddle] + np.arange(2)))
-        below = (over.index[own] == 0) & (energy[own] < energy[saddle])
-        top[own] = np.where(below, np.fmin(top[own], energy[saddle]), top[own])
-
-
 def _table_of_minima(over: StatesOver) -> Int[np.ndarray, "points most"]:
     """Numbers of the stable states over each point, `NONE` where there are fewer."""
     minima = np.flatnonzero(over.index == 0)
@@ -357,7 +361,7 @@ def _table_of_minima(over: StatesOver) -> Int[np.ndarray, "points most"]:
     return table
 
 
-def _nearest_states(over: StatesOver, z: Lanes, top: ItemValues) -> Numbers:
+def nearest_states(over: StatesOver, z: Lanes, top: ItemValues) -> Numbers:
     """The state over each point that a configuration is clearly nearest to, −1 without one.
 
     Of two states with the same top, such as a minimum and its saddle beside a fold, either will do.
