@@ -53,7 +53,7 @@ class Twin:
             if given.get("angle") == "held":
                 node = model.joint_nodes[self.joints.index(joint)]
                 full[:, node] = self.actuated(p, "turn", joint)
-        return full[:, model.member_nodes]
+        return full[:, model.piece_nodes]
 
     def actuated(self, p, kind, name, reverse=1.0):
         """Sum over the actuators of what they do somewhere."""
@@ -107,12 +107,12 @@ class Twin:
         total = np.zeros(len(z))
         turns, node = self.turns(z, p), {}
         for row, member, ends in zip(
-            self.frame.model.member_nodes, self.members, self.ends, strict=True
+            self.frame.model.piece_nodes, self.members, self.ends, strict=True
         ):
             for side in (0, -1):
                 if member.ends[side] not in member.hinges:
                     node[ends[side]] = int(row[side]), turns
-        places = self.frame.model.member_nodes
+        places = self.frame.model.piece_nodes
         for j, (joint, _) in enumerate(self.data["joints"].items()):
             if j not in node:
                 continue

@@ -127,7 +127,7 @@ class ChainedFrame(PlanarChained):
     def angles(self, state: State) -> Float[np.ndarray, "members links"]:
         """Angles at the middles of the links."""
         frame, z, p = self._frame, state.z[None], state.p[None]
-        turns = frame.turns(z, frame.scalars(z, p))[0][frame.model.member_nodes]
+        turns = frame.turns(z, frame.scalars(z, p))[0][frame.model.piece_nodes]
         inner = turns @ frame.model.mesh.interpolation(self._middles).T
         return np.asarray(inner + drawn_angles(frame.model, self._middles))
 
@@ -153,7 +153,7 @@ class ChainedFrame(PlanarChained):
         theta = v[self.linkage.angle_entries] - drawn_angles(model, self._middles)
         at = CubicSpline(self._middles, theta.T)(model.mesh.nodes).T
         nodes = np.zeros(len(model.place))
-        nodes[model.member_nodes] = at
+        nodes[model.piece_nodes] = at
         turning = model.joint_nodes >= 0
         nodes[model.joint_nodes[turning]] = v[self.linkage.turn_entries][turning]
         out = np.zeros(frame.size)

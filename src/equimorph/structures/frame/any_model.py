@@ -333,13 +333,13 @@ class AnyFrameModel(ABC):
 
     @property
     @abstractmethod
-    def rows_of_nodes(self) -> Int[np.ndarray, "pieces nodes"]:
+    def piece_nodes(self) -> Int[np.ndarray, "pieces nodes"]:
         """Nodes along each piece, from start to end."""
 
     @cached_property
     def nodes(self) -> Int[np.ndarray, "elements order"]:
         """Nodes of each element of each piece."""
-        return self.rows_of_nodes[:, self.mesh.element_nodes].reshape(-1, self.mesh.degree + 1)
+        return self.piece_nodes[:, self.mesh.element_nodes].reshape(-1, self.mesh.degree + 1)
 
     @cached_property
     def lengths(self) -> Float[np.ndarray, " pieces"]:

@@ -76,7 +76,7 @@ class FrameFields(FrameMechanics, AnyFrame):
 
     def turns_of_ends(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes members 2"]:
         """Turns of the members' ends."""
-        return self.turns(z, self.scalars(z, p))[:, self.model.member_nodes[:, [0, -1]]]
+        return self.turns(z, self.scalars(z, p))[:, self.model.piece_nodes[:, [0, -1]]]
 
     def end_moments(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes members 2"]:
         """Bending moments at start and end, positive where the member bends to its left."""
@@ -155,9 +155,9 @@ class FrameFields(FrameMechanics, AnyFrame):
         """States as guesses of those of the same frame with other elements."""
         model, fine = self.model, finer.model
         matrix = model.mesh.interpolation(fine.mesh.nodes)
-        turns = self.turns(z, self.scalars(z, p))[:, model.member_nodes] @ matrix.T
+        turns = self.turns(z, self.scalars(z, p))[:, model.piece_nodes] @ matrix.T
         nodes = np.zeros((len(z), len(fine.place)))
-        nodes[:, fine.member_nodes] = turns
+        nodes[:, fine.piece_nodes] = turns
         return np.concatenate([nodes[:, fine.place >= 0], z[:, self.unknowns :]], axis=1)
 
     def drawn_supports(

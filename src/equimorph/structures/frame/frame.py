@@ -52,7 +52,7 @@ class DescribedFrame(FrameFields):
             node, name = int(model.joint_nodes[made.joint(where)]), f"rotation({where})"
         else:
             member, side = made.end(where, joint)
-            node = int(model.member_nodes[member, -side])
+            node = int(model.piece_nodes[member, -side])
             name = f"rotation({made.edge_names[member]},{joint})"
         if node < 0:
             raise InputError(
@@ -84,7 +84,7 @@ class DescribedFrame(FrameFields):
         model = self.model
         at, side = model.network.end(member, joint)
         points = model.directions.reshape(len(model.lengths), -1)
-        node, drawn = model.member_nodes[at, -side], points[at, -side]
+        node, drawn = model.piece_nodes[at, -side], points[at, -side]
 
         def value(z: Lanes, p: Parameters) -> Values:
             angle = self.turns(z, self.scalars(z, p))[:, node] + drawn
@@ -213,7 +213,7 @@ class _Image:
     @cached_property
     def nodes(self) -> Int[np.ndarray, " nodes"]:
         """The node at which each comes to be."""
-        rows = self.frame.model.member_nodes
+        rows = self.frame.model.piece_nodes
         found = np.zeros(len(self.frame.model.place), int)
         for row, at, back in zip(rows, self.there, self.reversed, strict=True):
             found[row] = rows[at][::-1] if back else rows[at]

@@ -34,7 +34,7 @@ class Tables:
         for row in model.place[model.nodes].tolist():
             found |= {(i, j) for i in row for j in row if i >= j >= 0}
         forces = self.which
-        for m, row in enumerate(model.place[model.member_nodes].tolist()):
+        for m, row in enumerate(model.place[model.piece_nodes].tolist()):
             through = [n + c for c in forces[m, : self.ties[m, 0]].tolist()]
             found |= {(c, i) for c in through for i in row if i >= 0}
             if model.network.members[m].EA is not None:
@@ -53,7 +53,7 @@ class Tables:
         model = self.model
         late = np.zeros(len(model.place), bool)
         late[model.joint_nodes[model.network.rigid]] = True
-        late[model.member_nodes[model.network.hinged.all(axis=1), 0]] = True
+        late[model.piece_nodes[model.network.hinged.all(axis=1), 0]] = True
         of_nodes = np.where(late, 2, 0)[model.place >= 0]
         return np.concatenate([of_nodes, np.ones(model.multipliers, int)])
 
@@ -296,9 +296,9 @@ class FrameMechanics(DiscreteStructure):
         model, lanes = self.model, len(p)
         nodes = np.zeros((lanes, len(model.place)))
         turn = generator.normal(size=(lanes, len(model.network.joints)))
-        modes, s = np.arange(1, 4), np.linspace(0.0, 1.0, model.member_nodes.shape[1])
+        modes, s = np.arange(1, 4), np.linspace(0.0, 1.0, model.piece_nodes.shape[1])
         size = generator.uniform(size=(lanes, 1))
-        for row, ends in zip(model.member_nodes, model.network.ends, strict=True):
+        for row, ends in zip(model.piece_nodes, model.network.ends, strict=True):
             base = turn[:, ends[:1]] * (1.0 - s) + turn[:, ends[1:]] * s
             waves = generator.normal(size=(lanes, len(modes))) * (1.5 / modes)
             nodes[:, row] = size * (0.5 * base + waves @ np.sin(np.pi * np.outer(modes, s)))

@@ -62,7 +62,7 @@ class FrameModel(AnyFrameModel):
         return np.array(rows), joint_nodes
 
     @property
-    def member_nodes(self) -> Int[np.ndarray, "members nodes"]:
+    def piece_nodes(self) -> Int[np.ndarray, "members nodes"]:
         """Nodes along each member, from start to end."""
         return self._numbered[0]
 
@@ -71,15 +71,10 @@ class FrameModel(AnyFrameModel):
         """Node that turns with each joint; −1 where all members are hinged."""
         return self._numbered[1]
 
-    @property
-    def rows_of_nodes(self) -> Int[np.ndarray, "members nodes"]:
-        """Nodes along each member, from start to end."""
-        return self.member_nodes
-
     @cached_property
     def place(self) -> Int[np.ndarray, " nodes"]:
         """Unknown of each node; −1 where its turn is prescribed: ``turned y``."""
-        held = np.zeros(int(self.member_nodes.max()) + 1, bool)
+        held = np.zeros(int(self.piece_nodes.max()) + 1, bool)
         held[self.joint_nodes[np.isinf(self.network.supports[:, 2])]] = True
         return np.where(held, -1, np.cumsum(~held) - 1)
 
@@ -253,7 +248,7 @@ class FrameModel(AnyFrameModel):
     def slope(self) -> Float[np.ndarray, "nodes scalars"]:
         """Coefficients of ψ: couples, actuated curvatures and turned springs."""
         total = self.springs[:, None] * self.turned
-        for m, row in enumerate(self.member_nodes):
+        for m, row in enumerate(self.piece_nodes):
             total[row[-1]] += self.rigidity[m] * self.natural[m]
             total[row[0]] -= self.rigidity[m] * self.natural[m]
         for j, node in enumerate(self.joint_nodes.tolist()):

@@ -64,11 +64,6 @@ class SpatialFrameModel(AnyFrameModel):
         ends = self.network.body_of_end
         return np.concatenate([ends[:, :1], rows, ends[:, 1:]], axis=1)
 
-    @property
-    def rows_of_nodes(self) -> Int[np.ndarray, "pieces nodes"]:
-        """Nodes along each piece, from start to end."""
-        return self.piece_nodes
-
     @cached_property
     def turning(self) -> Int[np.ndarray, " nodes"]:
         """How each node turns; see `Turning`."""
