@@ -6,8 +6,8 @@ from matplotlib.image import AxesImage
 
 import equimorph as em
 from equimorph.plotting import portraits, shapes, style
+from equimorph.plotting.depth import Viewpoint
 from equimorph.plotting.surroundings import Surroundings
-from equimorph.plotting.viewpoint import Viewpoint
 from equimorph.structures.solids import profile, solids, tube
 from oracles.specimens import tripod
 from typecheck import unchecked

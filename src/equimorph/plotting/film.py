@@ -23,12 +23,12 @@ from equimorph.model import Constraint, position
 from equimorph.plotting import style
 from equimorph.plotting.counts import hatch_cut, shade_regions
 from equimorph.plotting.curves import path_of, states_along, track
+from equimorph.plotting.depth import draw_triad
 from equimorph.plotting.labels import descriptor_label, parameter_label, symbol
 from equimorph.plotting.moving import film_file, write_film
 from equimorph.plotting.plane import draw_folds, draw_track, frame_plane
 from equimorph.plotting.surroundings import Moving, Surroundings, frame_shapes, obstacles_of
 from equimorph.plotting.transitions import energy_path
-from equimorph.plotting.viewpoint import draw_triad
 from equimorph.structures import States
 from equimorph.tasks.route import Route
 

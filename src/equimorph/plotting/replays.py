@@ -13,8 +13,8 @@ from equimorph.argument_checks import check_arguments
 from equimorph.array_types import Float
 from equimorph.dynamics import Replay
 from equimorph.plotting import style
+from equimorph.plotting.depth import viewpoint_of
 from equimorph.plotting.moving import film_file, write_film
-from equimorph.plotting.viewpoint import viewpoint_of
 from equimorph.tasks.timing.speed import SpeedLimit
 
 _SMALLEST = 1e-4

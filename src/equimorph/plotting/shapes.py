@@ -17,9 +17,9 @@ from equimorph.errors import InputError
 from equimorph.model import Obstacle
 from equimorph.plotting import style
 from equimorph.plotting.curves import path_of, states_along
+from equimorph.plotting.depth import flat_shapes
 from equimorph.plotting.labels import BOX, with_unit
 from equimorph.plotting.surroundings import Surroundings, frame_shapes, limits
-from equimorph.plotting.viewpoint import flat_shapes
 from equimorph.structures import States
 from equimorph.tasks.calibration.calibrate import Calibration
 from equimorph.tasks.calibration.measurements import MeasuredShape

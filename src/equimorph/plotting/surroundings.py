@@ -20,10 +20,10 @@ from matplotlib.patheffects import Stroke as Casing
 from equimorph.array_types import Float
 from equimorph.model import ActuatorKind, Constraint, Drawing, Obstacle, Support, SupportKind
 from equimorph.plotting import style
+from equimorph.plotting.depth import Viewpoint, draw_triad, viewpoint_of
 from equimorph.plotting.labels import with_unit
 from equimorph.plotting.support_symbols import AWAY, HUB, SYMBOLS, UPRIGHT, Stroke
 from equimorph.plotting.tubes import Picture, draw_solids, moving_solid
-from equimorph.plotting.viewpoint import Viewpoint, draw_triad, viewpoint_of
 from equimorph.structures import States
 
 _RADIUS = 0.022

@@ -12,10 +12,9 @@ from matplotlib.image import AxesImage
 
 from equimorph.array_types import UInt8
 from equimorph.plotting import style
-from equimorph.plotting.depth import View, depth_buffer
+from equimorph.plotting.depth import View, Viewpoint, depth_buffer
 from equimorph.plotting.scene import SAMPLES, downsample
 from equimorph.plotting.shading import Paint, paint
-from equimorph.plotting.viewpoint import Viewpoint
 from equimorph.structures import States
 from equimorph.structures.solids import Mesh, joined, solids
 

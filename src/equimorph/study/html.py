@@ -12,7 +12,7 @@ import numpy as np
 from equimorph.array_types import Float
 from equimorph.arrays import Values
 from equimorph.model import Box, Constraint, Descriptor
-from equimorph.plotting.viewpoint import flat_shapes
+from equimorph.plotting.depth import flat_shapes
 from equimorph.structures import States
 
 ROOM = 0.03

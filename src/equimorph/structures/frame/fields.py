@@ -14,7 +14,7 @@ from equimorph.model.units import STANDARD_GRAVITY
 from equimorph.structures.frame.any_frame import AnyFrame
 from equimorph.structures.frame.mechanics import FrameMechanics
 from equimorph.structures.frame.model import FrameModel
-from equimorph.structures.places_inertia import MaterialPoints
+from equimorph.structures.vibration import MaterialPoints
 
 
 class FrameFields(FrameMechanics, AnyFrame):

@@ -11,7 +11,6 @@ from equimorph.arrays import Lanes, Parameters, Values, Velocity
 from equimorph.errors import InputError
 from equimorph.model import Descriptor, remember_call
 from equimorph.structures.contract import Written
-from equimorph.structures.places_inertia import MaterialPoints
 from equimorph.structures.rod.any_rod import (
     AnyRod,
     Arclengths,
@@ -24,6 +23,7 @@ from equimorph.structures.spatial.mechanics import SpatialMechanics
 from equimorph.structures.spatial.orbits import on_orbit
 from equimorph.structures.spatial.phase import PinnedMechanics
 from equimorph.structures.states import State
+from equimorph.structures.vibration import MaterialPoints
 
 STRAINS = {"twist": "κ_t", "side_curvature": "κ_n", "curvature": "κ_b"}
 """Strains in the order in which fields have them, with their symbols."""
