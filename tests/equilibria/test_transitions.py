@@ -189,4 +189,4 @@ def test_no_transition_is_missing_that_a_descent_finds():
 @pytest.mark.parametrize("part", range(10))
 def test_no_transition_of_fifty_structures_is_missing(part):
     for seed in range(5):
-        check_against_descents(2 + seed % 3, 100 + 5 * part + seed, 150)
+        check_against_descents(2 + seed % 3, 100 + 5 * part + seed, 200)
