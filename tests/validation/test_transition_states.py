@@ -136,3 +136,36 @@ def second_mode(span: float) -> float:
 
     found = fsolve(miss, [slope / 2, load, -slope], xtol=1e-13)
     return 2 * shoot(found)[4] / (4 * np.pi**2)
+
+
+@pytest.mark.parametrize("span", [0.9, np.sin(1.0)])
+def test_energy_released_where_an_inverted_strip_snaps(span):
+    """Both ends turned alike, as by Cazzolli and Dal Corso (2019): energies of both elasticae.
+
+    Neither is published as a number; both are computed by shooting at the angle of the pitchfork.
+    """
+    rod = em.Rod(span=span)
+    with unchecked():
+        network = em.transition_network(rod, {"Theta": 0, "Delta": 0, "q": 0}, starts=30)
+        inverted = min(network.states[network.minima], key=rod.elevation)
+        end = em.lift(inverted, {"Theta": 1.2}).end
+        landings = em.snap_landing(end.state)
+    angle = end.state["Theta"]
+    known = symmetric(angle, span, [-12.0, 60.0]) - symmetric(angle, span, [-2 * angle, 0.0])
+    assert end.kind == "branch point"
+    assert [each.released for each in landings] == pytest.approx([known] * 2, rel=1e-9)
+
+
+def symmetric(angle: float, span: float, guess: list[float]) -> float:
+    """Energy of a symmetric elastica with given end angles, by shooting; units λ_cr L."""
+
+    def shoot(unknown: np.ndarray) -> np.ndarray:
+        turn, force = unknown
+
+        def rates(_: float, y: np.ndarray) -> list[float]:
+            return [y[1], -force * np.sin(y[0]), np.cos(y[0]), 0.5 * y[1] ** 2]
+
+        return solve_ivp(rates, (0, 0.5), [angle, turn, 0, 0], rtol=1e-11, atol=1e-13).y[:, -1]
+
+    found = fsolve(lambda u: (shoot(u)[0], shoot(u)[2] - span / 2), guess, xtol=1e-12)
+    return 2 * shoot(found)[3] / (4 * np.pi**2)
