@@ -17,7 +17,7 @@ from equimorph.charts.preparation import crossing_facets, first_copies
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.geometry.setting import embed
-from equimorph.manifold.geometry.topology import Adjacency, adjacency, flags_of, pieces
+from equimorph.manifold.geometry.topology import Adjacency, adjacency, facets_of, flags_of, pieces
 from equimorph.structures import State, States
 from equimorph.tolerances import SAME_SOLUTION
 
@@ -182,13 +182,7 @@ class Atlas:
         across = np.flatnonzero(a != b)
         pairs = np.sort(np.stack([a, b], axis=1)[across], axis=1)
         facets = self.whole.facets[self.whole.across[across]]
-        d = facets.shape[1]
-        folds = [np.zeros((0, d), int)]
-        folds += [
-            np.stack([f[:-1], f[1:]], axis=1) if d == 2 else f.reshape(-1, d)
-            for f in self.eset.folds
-        ]
-        folded = flags_of(facets, np.concatenate(folds))
+        folded = flags_of(facets, facets_of(self.eset.folds, facets.shape[1]))
         values = self.eset.coordinates
         out = []
         for i, j in np.unique(pairs, axis=0).tolist():

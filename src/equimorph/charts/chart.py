@@ -26,6 +26,7 @@ from equimorph.charts.singular_pairs import SingularPairs
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet, Level, singular_set
 from equimorph.manifold.geometry.setting import embed
+from equimorph.manifold.geometry.topology import facets_of
 from equimorph.model import Descriptor
 from equimorph.structures import State, States
 from equimorph.tolerances import SAME_STATE
@@ -320,8 +321,7 @@ class DescriptorChart(Chart):
         plain = Cells(eset, self.coordinates, numbers)
         if len(self.names) != 2:
             return plain
-        folds = [np.stack([fold[:-1], fold[1:]], axis=1) for fold in eset.folds]
-        fixed = np.concatenate([np.zeros((0, 2), int), *folds])
+        fixed = facets_of(eset.folds, 2)
         flipped, sheet = eset.cells.copy(), sheet_labels(plain)
         for label in range(sheet.max() + 1):
             own = sheet == label

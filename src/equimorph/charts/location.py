@@ -19,6 +19,7 @@ from equimorph.arrays import (
     VertexFlags,
 )
 from equimorph.charts.coordinates import Coordinates
+from equimorph.charts.preparation import on_box
 from equimorph.equilibria import ParameterLine, TraceOptions
 from equimorph.equilibria.trace import trace
 from equimorph.equilibria.trace_options import EventCode
@@ -26,7 +27,13 @@ from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.geometry.points import VertexKind, are_singular, on_fold
 from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.geometry.simplices import volumes
-from equimorph.manifold.geometry.topology import Adjacency, adjacency, flags_of, orientation
+from equimorph.manifold.geometry.topology import (
+    Adjacency,
+    adjacency,
+    facets_of,
+    flags_of,
+    orientation,
+)
 from equimorph.manifold.lookup.cell_index import CellIndex, Hits
 from equimorph.manifold.lookup.exact_states import root_weights
 from equimorph.model import are_feasible
@@ -315,18 +322,11 @@ def facet_kinds(cells: Cells) -> tuple[Facets, np.ndarray]:
     of the set follow), or "singular" where the coordinates turn back without a fold.
     """
     eset, whole = cells.eset, cells.whole
-    d = whole.facets.shape[1]
     some = np.flatnonzero((whole.counts == 1) | cells.turning)
     facets = whole.facets[some]
-    folds = [np.zeros((0, d), int)]
-    folds += [np.stack([f[:-1], f[1:]], axis=1) if d == 2 else f.reshape(-1, d) for f in eset.folds]
+    folds = facets_of(eset.folds, facets.shape[1])
     all_of_them = adjacency(eset.cells)
     outer = flags_of(facets, all_of_them.facets[all_of_them.counts == 1])
-    lines = eset.coordinates[facets]
-    size = eset.box.upper - eset.box.lower
-    on_box = np.zeros(len(facets), bool)
-    for bound in (eset.box.lower, eset.box.upper):
-        on_box |= (np.abs(lines - bound) <= SLACK * size).all(axis=1).any(axis=1)
     capped = np.isin(eset.kinds, (VertexKind.CAP, VertexKind.CORNER))[facets].all(axis=1)
     met = (eset.kinds == VertexKind.CROSSING)[facets].all(axis=1)
     ended = whole.counts[some] == 1
@@ -336,7 +336,7 @@ def facet_kinds(cells: Cells) -> tuple[Facets, np.ndarray]:
     if cells.cut is not None:  # where an edge could not be cut, whole cells are left out
         cut = (cells.cut | on_fold(eset.kinds))[facets].all(axis=1)
     kinds = np.select(
-        [flags_of(facets, np.concatenate(folds)), ended & on_box & outer, ended & met & outer,
+        [flags_of(facets, folds), ended & on_box(eset, facets) & outer, ended & met & outer,
          ended & capped & outer, ended & cut, ended],
         [EdgeKind.FOLD, EdgeKind.BOX, EdgeKind.CROSSING, EdgeKind.CAP, EdgeKind.CUT, EdgeKind.HOLE],
         EdgeKind.SINGULAR,

@@ -15,6 +15,7 @@ from equimorph.manifold.geometry.topology import (
     Adjacency,
     adjacency,
     cut_at_crossings,
+    facets_of,
     flags_of,
     keys_of,
     orientation,
@@ -31,7 +32,9 @@ def cut_along_crossings(eset: EquilibriumSet) -> EquilibriumSet:
     """A set cut along its crossings, which become boundaries; a set without crossings as it is."""
     if not eset.crossings:
         return eset
-    crossings, folds = (_facets(curves, len(eset.names)) for curves in (eset.crossings, eset.folds))
+    crossings, folds = (
+        facets_of(curves, len(eset.names)) for curves in (eset.crossings, eset.folds)
+    )
     cells, origin = cut_at_crossings(eset.cells, crossings, len(eset.points))
     whole = adjacency(cells)
     folded = whole.facets[flags_of(np.sort(origin[whole.facets], axis=1), folds)]
@@ -50,7 +53,7 @@ def cut_along_crossings(eset: EquilibriumSet) -> EquilibriumSet:
 def crossing_facets(eset: EquilibriumSet, whole: Adjacency) -> Bool[np.ndarray, " F"]:
     """Facets at which a set that `cut_along_crossings` cut ends where other sheets cross."""
     met = (eset.kinds == VertexKind.CROSSING)[whole.facets].all(axis=1)
-    return np.asarray(met & (whole.counts == 1) & ~_on_box(eset, whole.facets))
+    return np.asarray(met & (whole.counts == 1) & ~on_box(eset, whole.facets))
 
 
 def first_copies(eset: EquilibriumSet) -> VertexNumbers:
@@ -64,18 +67,13 @@ def first_copies(eset: EquilibriumSet) -> VertexNumbers:
     return own
 
 
-def _on_box(eset: EquilibriumSet, facets: Facets) -> ItemFlags:
+def on_box(eset: EquilibriumSet, facets: Facets) -> ItemFlags:
     """Whether facets lie on a side of the box; points in one dimension never do."""
     size = eset.box.upper - eset.box.lower
     places, out = eset.coordinates[facets], np.zeros(len(facets), bool)
     for bound in (eset.box.lower, eset.box.upper):
         out |= (np.abs(places - bound) <= 1e-9 * size).all(axis=1).any(axis=1)
     return out
-
-
-def _facets(curves: tuple[Int[np.ndarray, "..."], ...], d: int) -> Facets:
-    parts = [np.stack([c[:-1], c[1:]], axis=1) if d == 2 else c.reshape(-1, d) for c in curves]
-    return np.concatenate([np.zeros((0, d), int), *parts])
 
 
 def add_cusp_vertices(fabric: Fabric) -> tuple[Fabric, Int[np.ndarray, " cusps"]]:

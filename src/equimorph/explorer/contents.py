@@ -25,6 +25,7 @@ from equimorph.manifold import (
     edge_middles,
     overturned_cells,
 )
+from equimorph.manifold.geometry.topology import facets_of
 from equimorph.model import Constraint, Descriptor, Disc, Obstacle
 from equimorph.plotting.curves import corner_steps, snap_steps
 from equimorph.plotting.support_symbols import AWAY, SYMBOLS, UPRIGHT
@@ -185,8 +186,8 @@ def contents(asked: Question) -> tuple[dict[str, Any], Arrays]:
         "overturned": overturned_cells(eset).astype(np.uint8),
         "stratum": eset.stratum.astype(np.int32),
         "component": eset.component.astype(np.int32),
-        "folds": _facets(eset.folds, d),
-        "crossings": _facets(eset.crossings, d),
+        "folds": facets_of(eset.folds, d).astype(np.int32),
+        "crossings": facets_of(eset.crossings, d).astype(np.int32),
         "mean": shown.mean.astype(np.float32),
         "modes": shown.modes.astype(np.float32),
         "low": shown.low.astype(np.float32),
@@ -280,15 +281,6 @@ def _scalars(
             "low": 0.0 if exact else low, "step": 1.0 if exact else step,
         })  # fmt: skip
     return words, arrays
-
-
-def _facets(pieces: Sequence[Int[np.ndarray, "..."]], d: int) -> Int[np.ndarray, "n d"]:
-    """Facets of folds or crossings: points, edges or triangles."""
-    rows = [
-        np.stack([each[:-1], each[1:]], axis=1) if d == 2 else each.reshape(-1, d)
-        for each in pieces
-    ]
-    return np.concatenate([np.zeros((0, d), int), *rows]).astype(np.int32)
 
 
 def _route(eset: EquilibriumSet, name: str, route: Route, extra: _States) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from equimorph.arrays import Flags, Values
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.geometry.tangents import fold_slopes, split_step
-from equimorph.manifold.geometry.topology import faces_of
+from equimorph.manifold.geometry.topology import faces_of, facets_of
 from equimorph.manifold.queries.least_squares import Residuals, nearest
 from equimorph.manifold.queries.locate import ValueFit, distinct_states, pieces_of
 from equimorph.manifold.queries.nearest import Ground, SetPoints, local_minima, points_at_vertices
@@ -223,8 +223,7 @@ def _at_edge(
 ) -> tuple[SetPoints, Values]:
     """States at the edge of stability beyond which alone the fit would become better."""
     eset = ground.eset
-    every = [_facets(piece, len(eset.names)) for piece in eset.folds]
-    facets = np.concatenate([np.zeros((0, len(eset.names)), int), *every])
+    facets = facets_of(eset.folds, len(eset.names))
     facets = facets[(eset.index[facets] == 0).all(axis=1)]
     single = facets.shape[1] == 1
     starts = facets[:, 0] if single else local_minima(faces_of(facets, 2), value)[:STARTS]
@@ -243,11 +242,6 @@ def _at_edge(
     parts = there & back & (stable[0] != stable[1])
     closed = parts & ~np.where(stable[0], nearer[0], nearer[1])
     return edge.take(closed), misfit[closed]
-
-
-def _facets(piece: Int[np.ndarray, "..."], d: int) -> Int[np.ndarray, "n d"]:
-    """Facets of a piece of a fold: a point, a polyline or triangles."""
-    return np.stack([piece[:-1], piece[1:]], axis=1) if d == 2 else piece.reshape(-1, d)
 
 
 def _weights(chi2: Values) -> Values:

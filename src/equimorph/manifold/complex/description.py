@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from equimorph.array_types import Bool, Float, Int
-from equimorph.arrays import CellFlags, CellNumbers, Cells, Facets, VertexNumbers
+from equimorph.arrays import CellFlags, CellNumbers, Cells, VertexNumbers
 from equimorph.manifold.complex.audit import Audit
 from equimorph.manifold.complex.base_mesh import BaseMesh
 from equimorph.manifold.complex.equilibrium_set import (
@@ -25,6 +25,7 @@ from equimorph.manifold.geometry.topology import (
     count_unbalanced,
     cut_at_crossings,
     euler_characteristic,
+    facets_of,
     flags_of,
     keys_of,
     labels,
@@ -163,17 +164,12 @@ def _boundaries(
         left = left & ~flags
     out = []
     for piece in pieces(whole.facets[once]):
-        keys = keys_of(_facets_of(piece, whole.facets.shape[1]), base)
+        keys = keys_of(facets_of([piece], whole.facets.shape[1]), base)
         amounts = {kind: int(np.isin(keys, own).sum()) for kind, own in marked.items()}
         amounts[BoundaryKind.BOX] = len(keys) - sum(amounts.values())
         kinds = [kind for kind, amount in amounts.items() if amount]
         out.append(Boundary(piece, kinds[0] if len(kinds) == 1 else BoundaryKind.MIXED))
     return tuple(out)
-
-
-def _facets_of(piece: Int[np.ndarray, "..."], d: int) -> Facets:
-    """Facets of a piece of the boundary: a point, a polyline or triangles."""
-    return np.stack([piece[:-1], piece[1:]], axis=1) if d == 2 else piece.reshape(-1, d)
 
 
 def _components(

@@ -15,6 +15,7 @@ from equimorph.manifold.complex.audit import Audit
 from equimorph.manifold.complex.base_mesh import BaseMesh
 from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.setting import Setting
+from equimorph.manifold.geometry.topology import facets_of
 from equimorph.manifold.lookup.near_crossings import NearCrossings, of_set
 from equimorph.manifold.lookup.over import Sheets
 from equimorph.manifold.lookup.states_over import StatesOver
@@ -279,12 +280,8 @@ class EquilibriumSet(Tabular):
         """Facets along which sheets cross, if they do."""
         if not self.crossings:
             return None
-        d = len(self.names)
-        pieces = [
-            np.stack([piece[:-1], piece[1:]], axis=1) if d == 2 else piece.reshape(-1, d)
-            for piece in self.crossings
-        ]
-        return of_set(self.setting, self.points, self.cells, np.concatenate(pieces))
+        facets = facets_of(self.crossings, len(self.names))
+        return of_set(self.setting, self.points, self.cells, facets)
 
 
 def _check_names(names: tuple[str, ...], at: Mapping[str, object]) -> None:

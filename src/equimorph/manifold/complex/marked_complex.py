@@ -43,6 +43,7 @@ from equimorph.manifold.geometry.tangents import (
 from equimorph.manifold.geometry.topology import (
     adjacency,
     cut_at_crossings,
+    facets_of,
     flags_of,
     keys_of,
     senses,
@@ -269,10 +270,7 @@ def fabric_of(eset: EquilibriumSet, framed: VertexFlags | None = None) -> Fabric
     framed: vertices at which frames are needed; all if None.
     """
     setting, d = eset.setting, len(eset.names)
-    crossings, folds = (
-        np.concatenate([np.zeros((0, d), int), *(_facets(piece, d) for piece in pieces)])
-        for pieces in (eset.crossings, eset.folds)
-    )
+    crossings, folds = (facets_of(pieces, d) for pieces in (eset.crossings, eset.folds))
     cells, origin = cut_at_crossings(eset.cells, crossings, len(eset.points))
     cells = cells.copy()
     z, p = eset.points.z[origin], eset.points.p[origin]
@@ -310,10 +308,6 @@ def ends_of_changes(cells: Cells, values: Float[np.ndarray, " V"]) -> VertexFlag
     own, out = values[cells], np.zeros(len(values), bool)
     out[cells[(own.min(axis=1) < 0.0) & (own.max(axis=1) > 0.0)]] = True
     return out
-
-
-def _facets(piece: Int[np.ndarray, "..."], d: int) -> Facets:
-    return np.stack([piece[:-1], piece[1:]], axis=1) if d == 2 else piece.reshape(-1, d)
 
 
 def _outer_marks(setting: Setting, eset: EquilibriumSet, facets: Facets) -> Items:

@@ -1,5 +1,6 @@
 """Topology of simplicial complexes: facets, components, strata, boundary pieces, orientation."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -180,6 +181,12 @@ def pieces(facets: Facets) -> list[Int[np.ndarray, "..."]]:
         return chains(facets)
     label = labels(len(facets), adjacency(facets).links) if len(facets) else np.zeros(0, int)
     return [facets[label == k] for k in range(label.max(initial=-1) + 1)]
+
+
+def facets_of(curves: Sequence[Int[np.ndarray, "..."]], d: int) -> Facets:
+    """Facets of all of several pieces, such as the folds of a set; see `pieces`."""
+    each = [np.stack([c[:-1], c[1:]], axis=1) if d == 2 else c.reshape(-1, d) for c in curves]
+    return np.concatenate([np.zeros((0, d), int), *each])
 
 
 def chains(pairs: Pairs) -> list[Int[np.ndarray, "..."]]:

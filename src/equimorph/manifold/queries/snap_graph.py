@@ -12,7 +12,7 @@ from equimorph.arrays import Facets, ItemFlags, Items
 from equimorph.equilibria import Landing, snap_landing
 from equimorph.errors import InputError
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
-from equimorph.manifold.geometry.topology import adjacency, flags_of, pieces
+from equimorph.manifold.geometry.topology import adjacency, facets_of, flags_of, pieces
 from equimorph.model import Progress, Silent
 from equimorph.tolerances import SAME_SOLUTION
 
@@ -129,9 +129,7 @@ def snap_graph(
 def stability_boundary(eset: EquilibriumSet, stratum: int) -> Facets:
     """Facets of the folds around a stratum, one a row."""
     whole = adjacency(eset.cells)
-    d = len(eset.names)
-    every = [_facets(piece, d) for piece in eset.folds]
-    folded = flags_of(whole.facets, np.concatenate([np.zeros((0, d), int), *every]))
+    folded = flags_of(whole.facets, facets_of(eset.folds, len(eset.names)))
     a, b = whole.links.T
     side_a, side_b = eset.stratum[a] == stratum, eset.stratum[b] == stratum
     own = np.unique(whole.across[(side_a != side_b) & folded[whole.across]])
@@ -142,11 +140,6 @@ def _pieces(eset: EquilibriumSet, stratum: int) -> Iterator[Items]:
     """Vertices of the pieces of the folds around a stable stratum, in order along curves."""
     for piece in pieces(stability_boundary(eset, stratum)):
         yield piece if len(eset.names) < 3 else np.unique(piece)
-
-
-def _facets(piece: Int[np.ndarray, "..."], d: int) -> Facets:
-    """Facets of a piece of a fold: a point, a polyline or triangles."""
-    return np.stack([piece[:-1], piece[1:]], axis=1) if d == 2 else piece.reshape(-1, d)
 
 
 class _Edge:

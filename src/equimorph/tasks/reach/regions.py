@@ -11,7 +11,7 @@ from equimorph.array_types import Bool, Float, Int
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet, cell_sizes
 from equimorph.manifold.geometry.simplices import volumes
-from equimorph.manifold.geometry.topology import adjacency, flags_of, pieces
+from equimorph.manifold.geometry.topology import adjacency, facets_of, flags_of, pieces
 from equimorph.manifold.lookup.cell_index import CellIndex
 from equimorph.model import Descriptor
 from equimorph.structures import States
@@ -167,8 +167,7 @@ def _outer(
     """Facets of one cell, and what each of them lies on."""
     whole, d = adjacency(eset.cells), len(eset.names)
     facets = whole.facets[whole.counts == 1]
-    every = [np.stack([f[:-1], f[1:]], 1) if d == 2 else f.reshape(-1, d) for f in eset.folds]
-    folded = flags_of(facets, np.concatenate([np.zeros((0, d), int), *every]))
+    folded = flags_of(facets, facets_of(eset.folds, d))
     sides = _sides(eset, facets)
     names: list[tuple[Kind, str]] = []
     for facet, fold, side in zip(facets, folded, sides, strict=True):
