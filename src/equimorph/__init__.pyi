@@ -205,6 +205,7 @@ from .tasks.planning.planner import (
 from .tasks.route import (
     Bottleneck as Bottleneck,
     Route as Route,
+    Relaxation as Relaxation,
 )
 from .tasks.planning.route_classes import (
     alternatives as alternatives,

@@ -215,3 +215,17 @@ def test_no_route_is_found_just_below_the_least_torque():
                 for side in (strip.height(0.5) >= 10, strip.height(0.5) <= -10)]  # fmt: skip
         below = em.plan(eset, *rest, within=[torque <= 45.17])
     assert not below.arrived
+
+
+def test_refusals_say_how_far_each_demand_has_to_give_way(spring_set, sides):
+    """Margin x (x − 1) where δ = 0: 0.3 needs x = 1.24162, and x = 1.2 allows 0.24."""
+    with unchecked():
+        route = em.plan(spring_set, *sides, within=[LENGTH <= 1.2], margin=0.3)
+    length, margin = route.relaxations
+    assert length.bound == pytest.approx(0.5 * (1.0 + np.sqrt(2.2)), abs=1e-8)
+    assert margin.bound == pytest.approx(0.24, abs=1e-8)
+    assert length.bound <= length.attained < 1.02 * length.bound
+    assert 0.98 * margin.bound < margin.attained <= margin.bound
+    assert route.explanation.startswith(route.why)
+    assert route.path is not None
+    assert route.path.arrived

@@ -7,7 +7,7 @@ from typing import Literal
 
 from equimorph import plotting
 from equimorph.manifold import EquilibriumSet
-from equimorph.model import Descriptor
+from equimorph.model import Constraint, Descriptor
 from equimorph.plotting.curves import snap_steps
 from equimorph.structures import State, States
 from equimorph.study import html
@@ -62,10 +62,17 @@ def as_route(answer: Tracking | Verification, status: Literal["arrived", "refuse
     return Route(status, answer.why, [], way, answer.margin, length, answer.schedule)
 
 
-def figures_of_way(eset: EquilibriumSet | None, name: str, route: Route, what: str) -> list[Figure]:
+def figures_of_way(
+    eset: EquilibriumSet | None,
+    name: str,
+    route: Route,
+    what: str,
+    bounds: tuple[Constraint, ...] = (),
+) -> list[Figure]:
     """Shapes and margins; the plane (alone if refused) and a film over two parameters.
 
-    Over fewer or more, the parameters that move instead. `what` is "route" or "motion".
+    Over fewer or more, the parameters that move instead. `what` is "route" or "motion"; `bounds`
+    are drawn beside those of the set.
     """
     shapes = still(
         f"{name}-shapes", partial(plotting.shapes, route),
@@ -73,7 +80,7 @@ def figures_of_way(eset: EquilibriumSet | None, name: str, route: Route, what: s
     )  # fmt: skip
     margins = still(
         f"{name}-margins",
-        partial(plotting.margins, route, within=() if eset is None else eset.constraints),
+        partial(plotting.margins, route, within=(*bounds, *(eset.constraints if eset else ()))),
         f"How far each state is from instability along the {what}.",
     )  # fmt: skip
     if eset is None or len(eset.names) != 2:

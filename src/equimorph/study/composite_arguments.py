@@ -1,10 +1,12 @@
 """Arguments of tasks that a study writes in several keys: ways, objectives, grids, options."""
 
+import re
 from dataclasses import dataclass
 from typing import Annotated, Any
 
 from pydantic import AfterValidator, Field, WithJsonSchema
 
+from equimorph.equilibria import worst_named
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Grid, Rates, Schedule, position
@@ -23,6 +25,7 @@ from equimorph.study.lookup import (
 )
 from equimorph.study.states import StateSection
 from equimorph.tasks.maps.actuator_map import unloaded_base
+from equimorph.tasks.planning.objectives import least, peak
 from equimorph.tasks.robustness.erring import ErringStructure, Errors
 from equimorph.tasks.start import check_schedule
 from equimorph.tasks.verification.schedule_check import first_state
@@ -30,6 +33,8 @@ from equimorph.tasks.verification.schedule_check import first_state
 Intervals = Annotated[list[Count], Field(min_length=2, max_length=2)]
 OBJECTIVES = ("length", "travel", "work", "clearance", "time")
 """What a route may have least of."""
+EXTREME = re.compile(r"(?P<which>peak|least)\((?P<descriptor>.+)\)")
+"""A descriptor whose largest value is kept low, or least value high."""
 
 
 @dataclass(frozen=True)
@@ -91,7 +96,10 @@ class WayArgument(Argument):
 
 
 class ObjectiveArgument(Argument):
-    """What a route should have least of: a term or weights of terms, with rates for time."""
+    """What a route should have least of: a term or weights of terms, with rates for time.
+
+    Or a descriptor, whose largest value on the way is kept low, or least value high.
+    """
 
     def keys(self) -> dict[str, tuple[Any, Any]]:
         """Give the objective, and the rates that time needs."""
@@ -108,7 +116,12 @@ class ObjectiveArgument(Argument):
     def look_up(self, ground: Ground, section: Any, place: str) -> Any:
         """Weights with terms."""
         check_parameters(ground.structure, section.rates or (), f"{place}.rates")
-        terms = _terms(getattr(section, self.key))
+        given = getattr(section, self.key)
+        if isinstance(given, str) and (extreme := EXTREME.fullmatch(given)):
+            with at_key(f"{place}.{self.key}"):
+                descriptor = worst_named(ground.structure, extreme["descriptor"])
+                return peak(descriptor) if extreme["which"] == "peak" else least(descriptor)
+        terms = _terms(given)
         return [
             (weight, Rates(section.rates or {}) if name == "time" else name)
             for name, weight in terms.items()
@@ -162,12 +175,14 @@ def _terms(given: Any) -> dict[str, float]:
 
 def _objective(given: Any) -> Any:
     """Check a term, or weights of terms; one requirement for both makes one readable line."""
+    if isinstance(given, str) and EXTREME.fullmatch(given):
+        return given
     terms = _terms(given) if isinstance(given, dict | str) else {}
     known = terms and set(terms) <= set(OBJECTIVES)
     if not (known and all(is_number(weight) and weight > 0 for weight in terms.values())):
         raise requirement(
-            f"be one of {', '.join(OBJECTIVES)}, or positive weights of these like "
-            "{ length = 1.0, work = 0.2 }"
+            f"be one of {', '.join(OBJECTIVES)}, positive weights of these like "
+            "{ length = 1.0, work = 0.2 }, or peak(descriptor) or least(descriptor)"
         )
     return given
 
@@ -177,7 +192,15 @@ _WEIGHTS |= {"additionalProperties": {"type": "number", "exclusiveMinimum": 0}}
 Objective = Annotated[
     Any,
     AfterValidator(_objective),
-    WithJsonSchema({"anyOf": [{"enum": list(OBJECTIVES)}, _WEIGHTS]}),
+    WithJsonSchema(
+        {
+            "anyOf": [
+                {"enum": list(OBJECTIVES)},
+                _WEIGHTS,
+                {"type": "string", "pattern": f"^{EXTREME.pattern.replace('?P', '')}$"},
+            ]
+        }
+    ),
 ]
 
 

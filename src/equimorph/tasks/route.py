@@ -58,6 +58,35 @@ class Bottleneck:
         return f"Bottleneck({self.value:.8g}: {self.kind} at {self.state.parameters})"
 
 
+@dataclass(frozen=True, eq=False)
+class Relaxation:
+    """How far one demand of a refused route has to give way, all others as they are.
+
+    Parameters
+    ----------
+    demand
+        The relaxed demand in words; at the bound itself routes come as near to it as they like.
+    bound
+        Its exact bound: the lowest peak, or highest least value, of what it bounds.
+    attained
+        What states from start to goal attain, on a route within 1 % of it; NaN if
+        these were not verified.
+    state
+        Where no route is better.
+    """
+
+    demand: str
+    bound: float
+    attained: float
+    state: State
+
+    def __str__(self) -> str:
+        """In words."""
+        if np.isnan(self.attained):
+            return f"{self.demand} was not verified to do"
+        return f"{self.demand} would do (verified at {self.attained:.8g})"
+
+
 @dataclass(frozen=True)
 class Route:
     """A verified route between two states, or the reason why none was found.
@@ -68,7 +97,8 @@ class Route:
     for the actuators. Where snaps were allowed, `snaps` has their landings, in order; where a peak
     was kept low, `bottleneck` has its exact value and place, and `cost` what the route attains;
     where errors are to be survived, `survival` has what is shown. A refused route carries the path
-    as far as it went, if there is one.
+    as far as it went, or to the state nearest to the goal that is reached, if there is one; and in
+    `relaxations` how far each demand of the caller has to give way alone, where that would do.
     """
 
     status: Literal["arrived", "refused"]
@@ -83,18 +113,19 @@ class Route:
     snaps: tuple[Landing, ...] = ()
     bottleneck: Bottleneck | None = None
     survival: Survival | None = None
+    relaxations: tuple[Relaxation, ...] = ()
 
     def __repr__(self) -> str:
         """Length and margin, or why there is no route."""
         if not self.arrived:
-            return f"Route(refused: {self.why})"
+            return f"Route(refused: {self.explanation})"
         snaps = f", snaps {len(self.snaps)}" if self.snaps else ""
         return f"Route(arrived: length {self.length:.4g}, margin {self.margin:.4g}{snaps})"
 
     def _repr_html_(self) -> str:
         """Table of length, margin, cost and way-points, for notebooks."""
         if not self.arrived:
-            return html_table("Route: refused", [], [["reason", self.why]])
+            return html_table("Route: refused", [], [["reason", self.explanation]])
         rows: list[list[Any]] = [["length", self.length], ["smallest margin", self.margin]]
         if self.objective != "length":
             rows.append([self.objective, self.cost])
@@ -107,6 +138,11 @@ class Route:
             words = ", ".join(f"{name} = {value:.6g}" for name, value in place.items())
             rows.append([f"way-point {number}", words])
         return html_table("Route: arrived", [], rows)
+
+    @property
+    def explanation(self) -> str:
+        """Reason of a refusal, and what would do."""
+        return "; ".join([self.why, *map(str, self.relaxations)])
 
     @property
     def arrived(self) -> bool:

@@ -17,6 +17,7 @@ from equimorph.model import Schedule
 from equimorph.storage import write_certificate
 from equimorph.study import html
 from equimorph.study.answers import as_route, figures_of_way, snaps_in_words, table_of_snaps
+from equimorph.study.composite_arguments import EXTREME
 from equimorph.study.fields import Name, Positive, requirement
 from equimorph.study.question import (
     PLANE,
@@ -76,6 +77,9 @@ class RouteKind(Kind[Routes]):
         if len(both) > 1:
             raise requirement(f"give one of {', '.join(given)} (not {' and '.join(both)})")
         others = [key for key in ("snap_price", "alternatives", "smooth") if getattr(section, key)]
+        extreme = isinstance(section.objective, str) and EXTREME.fullmatch(section.objective)
+        if extreme and others:
+            raise requirement(f"give one of objective = {section.objective!r}, {others[0]}")
         if section.survive is not None and others:
             raise requirement(f"give one of survive, {others[0]}")
         if section.smooth is not None and section.snap_price is not None:
@@ -110,7 +114,9 @@ class RouteKind(Kind[Routes]):
         self, question: Question, eset: EquilibriumSet | None, answer: Routes
     ) -> list[Figure]:
         """Shapes, margins, plane and film of the best; all of them on one plane."""
-        found = figures_of_way(eset, question.name, answer[0], "route")
+        best = answer[0].bottleneck
+        bounds = () if best is None else (question["objective"].bound(best.value, 0.0),)
+        found = figures_of_way(eset, question.name, answer[0], "route", bounds)
         if len(answer) > 1 and eset is not None:
             draw = partial(plotting.alternative_routes, eset, answer)
             caption = "Routes that cannot be drawn into each other; the first is the best."
@@ -126,7 +132,8 @@ class RouteKind(Kind[Routes]):
         others = f" {len(answer)} routes differ in how they pass holes." if len(answer) > 1 else ""
         if question.section.alternatives is not None and len(answer) == 1:
             others = " No other route passes the holes of the stable set differently."
-        return f"**arrived** {snaps_in_words(route)}, {size}{rounded}.{others}{_survival(route)}"
+        more = f"{others}{_best_possible(question, route)}{_survival(route)}"
+        return f"**arrived** {snaps_in_words(route)}, {size}{rounded}.{more}"
 
     def details(self, question: Question, answer: Routes) -> list[str]:
         """Snaps on the way, and routes side by side where there are several."""
@@ -143,11 +150,21 @@ class RouteKind(Kind[Routes]):
     def refusal(self, question: Question, answer: Routes) -> str:
         """Reason why there is no route."""
         del question
-        return "" if answer[0].arrived else answer[0].why
+        return "" if answer[0].arrived else answer[0].explanation
 
 
 def _name_routes(question: Question, answer: Routes) -> list[tuple[str, Route]]:
     return [(route_name(question.name, k), route) for k, route in enumerate(answer, 1)]
+
+
+def _best_possible(question: Question, route: Route) -> str:
+    """The lowest peak that any route has, or the highest least value, and where."""
+    best = route.bottleneck
+    if best is None:
+        return ""
+    side = "below" if question["objective"].sign > 0.0 else "above"
+    place = ", ".join(f"{name} = {html.number(best.state[name], 6)}" for name in question.free)
+    return f" No route stays {side} {html.number(best.value, 8)}: {best.kind} at {place}."
 
 
 def _survival(route: Route) -> str:
@@ -176,7 +193,9 @@ class SampledRouteKind(Kind[Route]):
     own = MappingProxyType({"goal": (NaturalSection | None, None)})
 
     def check(self, section: Any) -> None:
-        """It ends at a goal, or under loads."""
+        """It ends at a goal, or under loads; peaks need a set."""
+        if isinstance(section.objective, str) and EXTREME.fullmatch(section.objective):
+            raise requirement("give an objective without peak or least, which need a set")
         if section.goal is None and not section.loads:
             raise requirement("give a goal, or loads whose last values hold at the goal")
 

@@ -57,13 +57,27 @@ def _with_reserves(
 ) -> Route | None:
     route, least = None, _least_margin(ends, passing)
     for tightened in demands.with_reserves(least):
-        path = _path(eset, ends, tightened, passing)
-        if path is not None:
-            corners = straight_corners(eset, path, tightened)
-            route = route_over_corners(eset, follow_direction(corners, ends), demands, monitor)
-            if route.arrived:
-                return route
+        found = route_with_reserve(eset, ends, (demands, tightened), monitor, passing)
+        route = found or route
+        if route is not None and route.arrived:
+            return route
     return route
+
+
+def route_with_reserve(
+    eset: EquilibriumSet,
+    ends: Ends,
+    given: tuple[Demands, Demands],
+    monitor: Sequence[Descriptor] = (),
+    passing: Passing | None = None,
+) -> Route | None:
+    """Return a route, arrived or refused, for demands and tightened ones; None without a path."""
+    demands, tightened = given
+    path = _path(eset, ends, tightened, passing)
+    if path is None:
+        return None
+    corners = straight_corners(eset, path, tightened)
+    return route_over_corners(eset, follow_direction(corners, ends), demands, monitor)
 
 
 def _least_margin(ends: Ends, passing: Passing | None) -> float:
