@@ -69,8 +69,7 @@ class Relaxation:
     bound
         Its exact bound: the lowest peak, or highest least value, of what it bounds.
     attained
-        What states from start to goal attain, on a route within 1 % of it; NaN if
-        these were not verified.
+        What states from start to goal attain, on a route within 1 % of it; NaN if none was verified.
     state
         Where no route is better.
     """
