@@ -69,7 +69,7 @@ class Relaxation:
     bound
         Its exact bound: the lowest peak, or highest least value, of what it bounds.
     attained
-        What states from start to goal attain, on a route within 1 % of it; NaN if none was verified.
+        What a verified route within 1 % of it attains; NaN if none was found.
     state
         Where no route is better.
     """
@@ -96,8 +96,9 @@ class Route:
     for the actuators. Where snaps were allowed, `snaps` has their landings, in order; where a peak
     was kept low, `bottleneck` has its exact value and place, and `cost` what the route attains;
     where errors are to be survived, `survival` has what is shown. A refused route carries the path
-    as far as it went, or to the state nearest to the goal that is reached, if there is one; and in
-    `relaxations` how far each demand of the caller has to give way alone, where that would do.
+    as far as it went, if there is one; in `relaxations` how far each demand of the caller has to
+    give way alone, where that would do; and `nearest`, the state nearest to the goal that a
+    verified route reaches.
     """
 
     status: Literal["arrived", "refused"]
@@ -113,6 +114,7 @@ class Route:
     bottleneck: Bottleneck | None = None
     survival: Survival | None = None
     relaxations: tuple[Relaxation, ...] = ()
+    nearest: State | None = None
 
     def __repr__(self) -> str:
         """Length and margin, or why there is no route."""

@@ -35,7 +35,7 @@ def explained_refusal(
 
     A relaxation is the lowest peak of what is bounded within the other demands, and verified by
     a route. Where start and goal lie on different stable components, nothing relaxes that. The
-    refusal carries the route to the state nearest to the goal that is reached.
+    refusal carries the state nearest to the goal that a route reaches.
     """
     refused = refusal(explain_no_route(eset, ends, demands))
     relaxed = tuple(_relaxations(eset, ends, demands))
@@ -43,7 +43,7 @@ def explained_refusal(
     if nearest is not None:
         route = free_route(eset, (ends[0], nearest), demands, monitor)
         if route is not None and route.arrived:
-            refused = replace(refused, way_points=route.way_points, path=route.path)
+            refused = replace(refused, nearest=nearest)
     return replace(refused, relaxations=relaxed)
 
 
