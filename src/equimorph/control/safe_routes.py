@@ -20,6 +20,7 @@ from equimorph.tasks.planning.network import (
     network_of,
     on_paths,
     shortest_path,
+    vertices_around,
 )
 from equimorph.tasks.planning.objectives import objective_of
 from equimorph.tasks.planning.straightening import CORNER, STATIONS_WITH_MARGINS, pairs_on_path
@@ -171,10 +172,7 @@ def _around(
     eset: EquilibriumSet, number: Int[np.ndarray, " vertices"], place: Bundles, node: int
 ) -> Pairs:
     """Links from a place to the nodes of the vertices over its grid cell and those around."""
-    state, cells = place.estimated[0], eset.mesh.cells
-    own = eset.mesh.locate(np.array([state[name] for name in eset.names]))
-    around = np.unique(cells[np.isin(cells, cells[own]).any(axis=1)])
-    near = np.unique(number[np.isin(eset.grid_vertex, around)])
+    near = np.unique(number[vertices_around(eset, place.estimated[0])])
     near = near[near >= 0]
     return np.stack([np.full(len(near), node), near], axis=1)
 

@@ -79,15 +79,21 @@ class LinkagePlant(Simulation):
 
     # --- state ----------------------------------------------------------------------------------
 
+    def _number(self, kind: str, name: str) -> int:
+        """Number of a named body or site of the simulation; −1 without one."""
+        return int(self._mujoco.mj_name2id(self.model, getattr(self._mujoco.mjtObj, kind), name))
+
     @cached_property
     def _anchors(self) -> list[tuple[int, int]]:
         """Bodies of the simulation that stand in the world, and their nodes."""
-        name = self._mujoco.mjtObj.mjOBJ_BODY
-        return [
-            (self._mujoco.mj_name2id(self.model, name, f"b{k}"), body.base)
-            for k, body in enumerate(self.tree.bodies)
-            if body.base >= 0
-        ]
+        bodies = enumerate(self.tree.bodies)
+        return [(self._number("mjOBJ_BODY", f"b{k}"), b.base) for k, b in bodies if b.base >= 0]
+
+    @cached_property
+    def _sites(self) -> list[tuple[int, int]]:
+        """Sites fixed in the world at which loops are closed, and their nodes."""
+        found = [(self._number("mjOBJ_SITE", f"w{k}"), k) for k in range(self.linkage.nodes)]
+        return [each for each in found if each[0] >= 0]
 
     def start(self, v: Vector, y: Settings) -> None:
         """Place the linkage at rest."""
@@ -124,16 +130,6 @@ class LinkagePlant(Simulation):
         self._force = self._forces @ y
         self._couple = self._couples @ y
         self._y = y.copy()
-
-    @cached_property
-    def _sites(self) -> list[tuple[int, int]]:
-        """Sites fixed in the world at which loops are closed, and their nodes."""
-        name = self._mujoco.mjtObj.mjOBJ_SITE
-        found = [
-            (self._mujoco.mj_name2id(self.model, name, f"w{node}"), node)
-            for node in range(self.linkage.nodes)
-        ]
-        return [each for each in found if each[0] >= 0]
 
     def step(self) -> None:
         """One step in time; supports that moved since the last one carry their dampers."""

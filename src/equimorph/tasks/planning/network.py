@@ -301,13 +301,18 @@ def neighbours(
     eset: EquilibriumSet, allowed: Bool[np.ndarray, " V"], end: State, demands: Demands
 ) -> tuple[Int[np.ndarray, " n"], Float[np.ndarray, " n"]]:
     """Allowed vertices over the grid cells around a state that a straight lift reaches."""
-    cells = eset.mesh.cells
-    own = eset.mesh.locate(np.array([end[name] for name in eset.names]))
-    around = np.unique(cells[np.isin(cells, cells[own]).any(axis=1)])
-    near = np.flatnonzero(allowed & np.isin(eset.grid_vertex, around))
+    near = np.flatnonzero(allowed & vertices_around(eset, end))
     source = States(eset.structure, np.tile(end.z, (len(near), 1)), np.tile(end.p, (len(near), 1)))
     linked, cost = connect(source, eset.points[near], demands)
     return near[linked], cost[linked]
+
+
+def vertices_around(eset: EquilibriumSet, state: State) -> Flags:
+    """Which vertices lie over the grid cell of a state and those around it."""
+    cells = eset.mesh.cells
+    own = eset.mesh.locate(np.array([state[name] for name in eset.names]))
+    around = np.unique(cells[np.isin(cells, cells[own]).any(axis=1)])
+    return np.asarray(np.isin(eset.grid_vertex, around))
 
 
 def explain_no_route(eset: EquilibriumSet, ends: Ends, demands: Demands) -> str:
