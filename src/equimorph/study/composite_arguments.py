@@ -197,7 +197,7 @@ Objective = Annotated[
             "anyOf": [
                 {"enum": list(OBJECTIVES)},
                 _WEIGHTS,
-                {"type": "string", "pattern": f"^{EXTREME.pattern.replace('?P', '')}$"},
+                {"type": "string", "pattern": r"^(peak|least)\(.+\)$"},
             ]
         }
     ),
