@@ -3,6 +3,7 @@
 EQUIMORPH_SHAPES=unchecked leaves the checks out; see `typecheck`.
 """
 
+import gc
 import os
 import sys
 from collections.abc import Generator
@@ -52,6 +53,12 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         kept = items[first::TENTHS]
         config.hook.pytest_deselected(items=[item for item in items if item not in kept])
         items[:] = kept
+
+
+def pytest_collection_finish() -> None:
+    """What lives as long as the tests need not be looked through again and again for garbage."""
+    gc.collect()
+    gc.freeze()
 
 
 @pytest.hookimpl(wrapper=True)

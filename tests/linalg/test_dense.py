@@ -47,6 +47,16 @@ def test_a_matrix_of_zero_diagonal_takes_two_by_two_pivots():
     assert negative_eigenvalues(block[None])[0] == 3
 
 
+@pytest.mark.parametrize("n", range(1, 8))
+def test_pivots_that_overflow_count_as_minus_one_or_right(n):
+    """Products of two entries of 1e300 are no numbers: nothing beyond the matrix is touched."""
+    matrix = np.random.default_rng(n).normal(size=(50, n, n))
+    matrix += matrix.transpose(0, 2, 1)
+    found = negative_eigenvalues(matrix * 1e300)
+    known = negative_eigenvalues(matrix)
+    assert ((found == known) | (found == -1)).all()
+
+
 def test_entries_that_are_not_finite_count_as_minus_one():
     matrices = np.stack([np.eye(3), np.full((3, 3), np.nan), -np.eye(3)])
     np.testing.assert_array_equal(negative_eigenvalues(matrices), [0, -1, 3])

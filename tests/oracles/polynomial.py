@@ -66,17 +66,17 @@ class Table:
             for term, factor in each.terms.items():
                 self.factors[exponents.index(term), i] = factor
         self.shape = shape
+        self.variables = np.flatnonzero(self.exponents.any(axis=0))
 
     def __call__(self, z: np.ndarray, p: np.ndarray) -> np.ndarray:
-        x = np.concatenate([z, p], axis=1)
-        powers = [np.ones_like(x)]  # products are much cheaper than x ** exponents
-        for _ in range(self.highest):
-            powers.append(powers[-1] * x)
-        table = np.stack(powers)
-        monomials = table[self.exponents[:, 0], :, 0]
-        for i in range(1, self.exponents.shape[1]):
-            monomials = monomials * table[self.exponents[:, i], :, i]
-        return (monomials.T @ self.factors).reshape(len(x), *self.shape)
+        x = np.concatenate([z, p], axis=1).T
+        powers = np.ones((self.highest + 1, *x.shape))
+        for k in range(self.highest):  # products are much cheaper than x ** exponents
+            np.multiply(powers[k], x, out=powers[k + 1])
+        monomials = np.ones((len(self.exponents), x.shape[1]))
+        for i in self.variables:
+            monomials *= powers[self.exponents[:, i], i]
+        return (monomials.T @ self.factors).reshape(-1, *self.shape)
 
 
 class Polynomial(Structure):

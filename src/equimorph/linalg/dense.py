@@ -67,14 +67,14 @@ def negative_eigenvalues(matrix: Float[np.ndarray, "lanes n n"]) -> Numbers:
     """Count the negative eigenvalues of symmetric matrices.
 
     LDLᵀ with complete pivoting [BunchParlett1971]_ and Sylvester's law of inertia. A matrix with
-    entries that are not finite counts as −1.
+    entries that are not finite, or become so, counts as −1.
     """
     out = np.full(len(matrix), -1, dtype=np.int64)
-    finite = np.isfinite(matrix).all(axis=(1, 2))
-    if finite.any():
-        counts = np.empty(int(finite.sum()), dtype=np.int64)
-        count_negative(np.ascontiguousarray(matrix[finite]), counts)
-        out[finite] = counts
+    finite = np.isfinite(matrix)
+    if finite.all():
+        count_negative(np.ascontiguousarray(matrix), out)
+    elif (usable := finite.all(axis=(1, 2))).any():
+        out[usable] = negative_eigenvalues(matrix[usable])
     return out
 
 
@@ -114,19 +114,26 @@ def solve_bordered(
 
 def _determinant(matrix: Float[np.ndarray, "lanes n n"]) -> Values:
     with np.errstate(all="ignore"):
-        product = np.linalg.det(matrix)
-    return np.asarray(np.where(np.isfinite(product), product, np.nan))
+        product = np.asarray(np.linalg.det(matrix))
+    if not np.isfinite(product).all():
+        product[~np.isfinite(product)] = np.nan
+    return product
 
 
 def _solve(
     full: Float[np.ndarray, "lanes b b"], rhs: Float[np.ndarray, "lanes b sides"]
 ) -> Float[np.ndarray, "lanes b sides"]:
-    usable = np.isfinite(full).all(axis=(1, 2)) & np.isfinite(rhs).all(axis=(1, 2))
+    every = np.isfinite(full).all() and np.isfinite(rhs).all()
+    usable = (
+        slice(None)
+        if every
+        else np.isfinite(full).all(axis=(1, 2)) & np.isfinite(rhs).all(axis=(1, 2))
+    )
     x = np.full(rhs.shape, np.nan)
     try:
         x[usable] = np.linalg.solve(full[usable], rhs[usable])
     except np.linalg.LinAlgError:  # one singular lane fails the batch: go one by one
-        for lane in np.flatnonzero(usable):
+        for lane in np.arange(len(full))[usable]:
             try:
                 x[lane] = np.linalg.solve(full[lane], rhs[lane])
             except np.linalg.LinAlgError:

@@ -55,7 +55,8 @@ def factor_symmetric(a):
     """Number of negative eigenvalues of a symmetric matrix, by LDLᵀ with complete pivoting.
 
     Bunch and Parlett (1971): 1 × 1 and 2 × 2 pivots; `a` is overwritten. Sylvester's law of inertia
-    gives the signs: a 2 × 2 pivot chosen by this rule always has one negative eigenvalue.
+    gives the signs: a 2 × 2 pivot chosen by this rule always has one negative eigenvalue. −1 where
+    entries are not finite.
     """
     size = a.shape[0]
     alpha = 0.6403882032022076  # (1 + √17) / 8 bounds the growth of the entries
@@ -69,6 +70,8 @@ def factor_symmetric(a):
             for j in range(k, i):
                 if abs(a[i, j]) > off:
                     off, r, s = abs(a[i, j]), i, j
+        if max(diagonal, off) < 0.0:  # a pivot that overflows leaves no numbers
+            return -1
         if max(diagonal, off) == 0.0:
             break
         if diagonal >= alpha * off:
