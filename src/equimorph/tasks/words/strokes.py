@@ -150,7 +150,7 @@ class _Exploration:
         return WordGraph(stops, int((~away).sum()), words_of(stops, letters), tuple(moves), doubts)
 
     def _follow(self, stops: Items, name: str, end: float) -> "list[_Fall]":
-        """WordMove a parameter to the end of its stroke; where stability is lost before."""
+        """Move a parameter to the end of its stroke; where stability is lost before."""
         fallen = []
         for some, lifts, work in self._lifts(stops, name, end):
             for lane, kind in enumerate(lifts.kind.tolist()):
@@ -162,7 +162,7 @@ class _Exploration:
         return fallen
 
     def _return(self, stops: Items, name: str) -> None:
-        """WordMove a parameter back to its value at rest."""
+        """Move a parameter back to its value at rest."""
         rest = float(self.rest[position(self.stops.structure.parameters, name)])
         for some, lifts, work in self._lifts(stops, name, rest):
             for lane in np.flatnonzero(lifts.kind == EventKind.ARRIVED).tolist():
