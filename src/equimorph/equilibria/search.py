@@ -386,19 +386,11 @@ class _Catch:
 
     def states(self, arguments: tuple[Argument, ...]) -> FoundStates:
         """Return the result."""
-        z = self.z[self.kept]
-        p = np.tile(self.ground.p, (len(z), 1))
+        structure, z = self.ground.structure, self.z[self.kept]
         reasons = (UNRESOLVED,) if len(z) else (UNRESOLVED, BEYOND)
         unresolved = sum(self.failures.get(reason, 0) for reason in reasons)
         completeness = Completeness(self.captured, unresolved)
-        dropped = self.unresolved[distinct(self.ground.structure, self.unresolved)]
-        there = np.tile(self.ground.p, (len(dropped), 1))
-        return FoundStates(
-            self.ground.structure,
-            z,
-            p,
-            completeness,
-            self.failures,
-            arguments,
-            States(self.ground.structure, dropped, there),
-        )
+        dropped = self.unresolved[distinct(structure, self.unresolved)]
+        p, there = (np.tile(self.ground.p, (len(each), 1)) for each in (z, dropped))
+        beside = States(structure, dropped, there)
+        return FoundStates(structure, z, p, completeness, self.failures, arguments, beside)
