@@ -122,6 +122,8 @@ from .manifold import (
     barriers as barriers,
     SetBarriers as SetBarriers,
     Barriers as Barriers,
+    network_changes as network_changes,
+    NetworkChanges as NetworkChanges,
 )
 from .dynamics import (
     least_shock as least_shock,
@@ -170,8 +172,6 @@ from .manifold import (
     Components as Components,
     stability_distance as stability_distance,
     StabilityDistance as StabilityDistance,
-    network_changes as network_changes,
-    NetworkChanges as NetworkChanges,
     snap_graph as snap_graph,
     SnapGraph as SnapGraph,
 )

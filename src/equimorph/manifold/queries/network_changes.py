@@ -72,8 +72,8 @@ def network_changes(field: SetBarriers) -> NetworkChanges:
     >>> from equimorph import Box, Spring, barriers, equilibrium_set, network_changes
     >>> box = Box(x_l=(0.6, 1.2), F=(-0.1, 0.12))
     >>> changes = network_changes(barriers(equilibrium_set(Spring(), box, intervals=(6, 7))))
-    >>> abs(changes.swaps.states["F"]).max().round(9)  # both sides are alike
-    0.0
+    >>> type(changes).__name__, bool(abs(changes.swaps.states["F"]).max() < 1e-9)  # alike sides
+    ('NetworkChanges', True)
     """
     return NetworkChanges(field.eset, *(_ties(field, index) for index in (0, 1)))
 

@@ -14,7 +14,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import breadth_first_order, minimum_spanning_tree
 
 from equimorph.array_types import Float
-from equimorph.arrays import Facets, Items, ItemValues, Pairs
+from equimorph.arrays import Facets, Items, ItemValues, Pairs, Some
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.complex.kept_sets import from_cache
 from equimorph.manifold.geometry.points import VertexKind
@@ -31,7 +31,7 @@ Shares = Float[np.ndarray, "n d"]
 class Passages:
     """Stable cells of a set, pairs of them that share a facet (as rows), and these facets."""
 
-    cells: Items
+    cells: Some
     links: Pairs
     facets: Facets
 
