@@ -81,7 +81,9 @@ def test_nothing_is_proved_across_a_fold():
     structure = fold_form()
     x, a = np.array([[0.2], [-0.2]]), np.array([[0.04], [0.0401]])
     x[1] = -np.sqrt(0.0401)
-    assert prove(States(structure, x, a)).status == "unproved"
+    proof = prove(States(structure, x, a))
+    assert proof.status == "unproved"
+    assert proof.why == "states of the route lie on different sheets"
 
 
 def hanging_arm():

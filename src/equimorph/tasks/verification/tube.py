@@ -14,13 +14,13 @@ from typing import Literal
 import numpy as np
 
 from equimorph.array_types import Float, Int
-from equimorph.arrays import Flags, Lanes, Pairs, Parameters
+from equimorph.arrays import Flags, Items, Lanes, Pairs, Parameters
 from equimorph.columns import Columns
 from equimorph.equilibria import Event, ParameterLine, TraceOptions, settle, trace
 from equimorph.equilibria.soft_modes import metric_length
 from equimorph.equilibria.trace_options import EventCode
 from equimorph.model import Constraint, worst_relative_excess
-from equimorph.structures import State, States
+from equimorph.structures import State, States, Structure
 from equimorph.tasks.verification.error_box import Deviation, ErrorBox
 from equimorph.tasks.verification.evidence import (
     ProofStatus,
@@ -30,6 +30,7 @@ from equimorph.tasks.verification.evidence import (
     standing,
 )
 from equimorph.tasks.verification.newton_kantorovich import Bounds, segment_bounds
+from equimorph.tolerances import SAME_SOLUTION
 
 MOST_CELLS = 20_000
 """Cells that are tried at most before the proof of a tube is given up."""
@@ -228,9 +229,13 @@ class Tube:
             if (data > HOPELESS**2 * moves[:, : 1 + errors].max(axis=1)).any():
                 why = "errors of data, which are not divided, move the states too far"
                 break
-            halves, lost = self._halves(whole.take(bad), moves[:, : 1 + errors].argmax(axis=1))
+            axis = moves[:, : 1 + errors].argmax(axis=1)
+            halves, lost = self._halves(whole.take(bad), axis)
             if lost is not None:
                 return Division(f"the sheet ends at a {lost.kind}", whole, tried, lost.state)
+            if _meet_on_two_sheets(structure, halves, axis):
+                why = "states of the route lie on different sheets"
+                break
             tried += 2 * len(bad)
             rest = whole.take(np.setdiff1d(np.arange(len(whole.good)), bad))
             whole = Judged.concatenate([rest, self._judge(halves)])
@@ -327,6 +332,13 @@ class Tube:
             ends.append((z, goal))
         (before, start), (after, last) = ends
         return replace(halves, before=before, after=after, start=start, end=last), None
+
+
+def _meet_on_two_sheets(structure: Structure, halves: Cells, axis: Items) -> bool:
+    """Whether halves of a segment, each followed from its own end, differ where they meet."""
+    count = len(axis)
+    gap = (halves.after[:count] - halves.before[count:])[:, : structure.unknowns]
+    return bool((metric_length(structure, gap)[axis == 0] > SAME_SOLUTION).any())
 
 
 def _move(origin: States, guess: Lanes, p: Parameters) -> tuple[Lanes, Event | None]:
