@@ -143,31 +143,44 @@ class Jet:
 # Energies: groups of equal terms in local variables A(y, 1), or quadratic forms xᵀKx/2 of these.
 
 
-def rod(data, size, count):
-    """θᵀKθ/2 - θᵀSw + Σ (N - γ(N + T)²/2) + wᵀQw/2, N = a sin θ + b cos θ; w = (multipliers, p, 1).
+def planar(data, size, count):
+    """θᵀKθ/2 - θᵀSw + Σ ((1 + e)N - γ(N + T)²/2) + wᵀQw/2 - pV, N = a sin θ + b cos θ at points.
 
-    θ at unknown nodes are the first entries of z, at prescribed ends rows of w; a, b, T as well.
+    w = (multipliers, p, 1); θ of a node is an entry of z, or prescribed: a row of `turned` times w.
     """
     t = {name: np.array(each) for name, each in data.items() if name != "kind"}
-    y, (scalars, nodes), order = np.eye(size + count + 1), t["slope"].shape, t["stiffness"].shape[1]
-    unknowns, w, angles = len(y) - scalars, y[len(y) - scalars :], np.zeros((nodes, len(y)))
-    angles[[0, -1]] = t["turned"] @ w
-    angles[t["first"] :][:unknowns] = y[:unknowns]
-    elements = [angles[e * (order - 1) :][:order] for e in range(len(t["stiffness"]))]
+    y, (scalars, nodes) = np.eye(size + count + 1), t["slope"].shape
+    w, place = y[len(y) - scalars :], t["place"]
+    angles = np.where(place[:, None] < 0, t["turned"] @ w, y[place])
     work = np.zeros((nodes + scalars, nodes + scalars))
+    work[:nodes, :nodes], work[nodes:, nodes:] = np.diag(t["springs"]), t["quadratic"]
     work[:nodes, nodes:], work[nodes:, :nodes] = -t["slope"].T, -t["slope"]
-    work[nodes:, nodes:] = t["quadratic"]
-    fields = [t[name].T @ w for name in ("sine", "cosine", "tension")]
+    fields = [t[name].T @ w for name in ("sine", "cosine", "stretch", "tension")]
 
-    def point(theta, a, b, pull):
+    def point(theta, a, b, stretch, pull):
         normal = a * theta.of("sin") + b * theta.of("cos")
-        return normal + (normal + pull) * (normal + pull) * (-0.5 * t["softness"])
+        both = normal + pull
+        return normal + stretch * normal + both * both * (-0.5 * t["softness"])
 
-    return [
-        (np.array(elements), t["stiffness"]),
+    groups = [
+        (angles[t["elements"]], t["stiffness"]),
         (np.concatenate([angles, w])[None], work[None]),
         (np.stack([angles[t["points"]], *fields], axis=1), point),
     ]
+    if "area" not in t:
+        return groups
+    first, last = np.divmod(np.arange(nodes * nodes), nodes)
+    (xx, xy), (yx, yy) = t["closing"]
+    both, pull = t["weights"][first] * t["weights"][last], t["pressure"] @ w
+
+    def area(one, other, pressure):
+        """Pairs of V = Σ cos θᵢ Wᵢⱼ sin θⱼ + dᵀQd/2, d = Σ m (cos θ, sin θ)."""
+        (c, s), (x, y) = ((each.of("cos"), each.of("sin")) for each in (one, other))
+        closed = (c * x * xx + s * y * yy + c * y * xy + s * x * yx) * (0.5 * both)
+        return pressure * (c * y * t["area"].ravel() + closed) * -1.0
+
+    pairs = [angles[first], angles[last], np.tile(pull, (len(first), 1))]
+    return [*groups, (np.stack(pairs, axis=1), area)]
 
 
 def constant(size):
@@ -236,7 +249,7 @@ def program(data, size, count):
     return [(constant(size + count)[None], energy)]
 
 
-KINDS = {"rod": rod, "truss": truss, "spring": spring, "program": program}
+KINDS = {"planar": planar, "truss": truss, "spring": spring, "program": program}
 
 
 def reshape(x, *shape):

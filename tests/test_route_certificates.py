@@ -15,6 +15,7 @@ import pytest
 
 import equimorph as em
 from oracles.polynomial import bead_on_a_circle
+from oracles.specimens import toggle
 from typecheck import unchecked
 
 CHECKER = Path(__file__).parents[1] / "checker" / "check_route.py"
@@ -70,11 +71,33 @@ def stretchable():
     ).natural_state()  # fmt: skip
 
 
+def pressed():
+    """One end slides, so that pressure works on the chord, too."""
+    rod = em.Rod(ends=("clamped", "sliding"), loads={"p": em.Pressure()}, elements=2, degree=5)
+    return rod.natural_state(Theta=0.5)
+
+
+def portal():
+    """A hinge, members that stretch, and one that grows."""
+    joints = {"A": (0.0, 0.0), "B": (0.0, 1.0), "C": (1.0, 1.0), "D": (1.0, 0.0)}
+    members = [
+        em.Member(("A", "B"), EA=40.0), ("B", "C"), em.Member(("C", "D"), hinges=("C",)),
+    ]  # fmt: skip
+    return em.Frame(
+        joints, members, {"A": "fixed", "D": {"x": "held", "y": "held", "angle": 3.0}},
+        loads={"P": {"B": (0.3, -1.0)}}, actuators={"a": {"length": {"A-B": 1.0}}},
+        elements=1, degree=5,
+    ).natural_state()  # fmt: skip
+
+
 CASES = {
     "rod": (arch, [{"Theta": 1.03}, {"Delta": 0.02}]),
     "green truss": (lambda: shallow("green"), [{"P": 3e-4}, {"a": 0.003}]),
     "engineering truss": (lambda: shallow("engineering"), [{"P": 2e-4}]),
     "stretchable rod": (stretchable, [{"P": 0.01}]),
+    "pressed rod": (pressed, [{"p": 0.05}]),
+    "frame": (lambda: toggle().natural_state(), [{"P": 0.1}, {"a": 0.01}]),
+    "frame of several kinds": (portal, [{"P": 0.1}, {"a": 0.005}]),
     "spring": (lambda: em.Spring().natural_state(x_l=0.8), [{"F": 0.01}]),
     "formula": (formula, [{"F": 0.05}]),
     "constrained formula": (bead, [{"F": 0.02}]),
@@ -155,7 +178,7 @@ def leave_gap(data, tubes, k, generator):
 
 
 def change_structure(data, tubes, k, generator):
-    table = {"rod": "sine", "truss": "stiffness"}[data["structure"]["kind"]]
+    table = {"planar": "sine", "truss": "stiffness"}[data["structure"]["kind"]]
     data["structure"][table] = (1.05 * np.array(data["structure"][table])).tolist()
 
 

@@ -21,6 +21,8 @@ ULPS = 4
 """Units in the last place by which library functions may be wrong, and more than they are."""
 UNIT = 2.0**-53
 """Unit round-off u of double precision."""
+ROOM = 2.0 * UNIT * ULPS
+"""As much relative to a number, at least."""
 LARGEST_ANGLE = 1e7
 """Angle beyond which sine and cosine are only known to lie between −1 and 1."""
 MORE = 1.0 + 1e-12
@@ -156,8 +158,8 @@ def interval(values: Any) -> Interval:
 def widen(a: Interval) -> Interval:
     """Intervals widened by a few units in the last place; unknown bounds become infinite."""
     with np.errstate(invalid="ignore"):
-        room = ULPS * np.spacing(np.where(np.isfinite(a.size), a.size, 0.0))
-    low, high = a.low - room, a.high + room
+        low = a.low - (ROOM * np.abs(a.low) + TINY)
+        high = a.high + (ROOM * np.abs(a.high) + TINY)
     return Interval(np.where(np.isnan(low), -np.inf, low), np.where(np.isnan(high), np.inf, high))
 
 

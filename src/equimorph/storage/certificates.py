@@ -12,7 +12,7 @@ from equimorph.storage.files import write_text
 from equimorph.tasks.verification.evidence import ProofStatus
 from equimorph.tasks.verification.proof import Proof
 
-FORMAT = "route certificate, version 1"
+FORMAT = "route certificate, version 2"
 """First entry of a certificate."""
 
 
@@ -39,7 +39,7 @@ def write_certificate(proof: Proof, path: str | Path) -> Path:
     ------
     InputError
         If nothing is proved, for a structure whose energy is not written in plain numbers (those
-        of springs, trusses, planar rods and formulas are), or for another ending.
+        of springs, trusses, planar rods and frames and formulas are), or for another ending.
 
     Examples
     --------
@@ -54,7 +54,7 @@ def write_certificate(proof: Proof, path: str | Path) -> Path:
     if energy is None:
         raise InputError(
             f"`proof` must be that of a structure whose energy is written in numbers (spring, "
-            f"truss, planar rod, usual formulas); got a {structure.kind}."
+            f"truss, planar rod or frame, usual formulas); got a {structure.kind}."
         )
     certificate = {
         "format": FORMAT,

@@ -90,24 +90,29 @@ def hanging_arm():
     return Rod(ends=("clamped", "free"), loads={"w": em.LineLoad()}, elements=2, degree=6)
 
 
-def test_sampled_bounds_support_and_prove_nothing():
-    with unchecked():
-        found = verify([{"P": 1e-3}], toggle().natural_state(), proof=True)
-    supported(found)
-
-
 def stretchable_arc():
     return Rod(axial=1000.0, ends=("pinned", "pinned"), span=0.98, curvature=0.5, elements=3)
 
 
+def pressed_arch():
+    ends = ("clamped", "clamped")
+    return Rod(ends=ends, loads={"p": em.Pressure()}, elements=4, degree=5)
+
+
 @pytest.mark.parametrize(
     ("make", "to"),
-    [(hanging_arm, {"w": 0.05}), (stretchable_arc, {"nu": 0.975})],
-    ids=["cantilever", "stretchable arc"],
+    [
+        (hanging_arm, {"w": 0.05}),
+        (stretchable_arc, {"nu": 0.975}),
+        (pressed_arch, {"p": 0.1}),
+        (toggle, {"P": 0.5}),
+    ],
+    ids=["cantilever", "stretchable arc", "pressed arch", "frame"],
 )
-def test_rods_with_other_ends_are_proved(make, to):
+def test_rods_with_other_ends_and_frames_are_proved(make, to):
     with unchecked():
-        found = verify([to], make().natural_state(), proof=True)
+        start = make().natural_state(**({"Theta": 1.0} if make is pressed_arch else {}))
+        found = verify([to], start, proof=True)
     assert found.proof.status == "proved", found.proof.why
     assert 0.5 * found.margin < found.proof.margin <= found.margin
 

@@ -2,18 +2,20 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
 from equimorph.array_types import Bool, Float, Int
 from equimorph.arrays import Entries, Flags, Lanes, Nodal, Parameters, Scalars, Values
 from equimorph.linalg.dense import multiply
+from equimorph.linalg.intervals import Interval
 from equimorph.linalg.sparse import SparseLayout
 from equimorph.structures.discrete import DiscreteStructure, linearise
-from equimorph.structures.equations import Direction
+from equimorph.structures.equations import Direction, Enclosed
 from equimorph.structures.frame.kernels import linearise_lanes
 from equimorph.structures.frame.model import FrameModel
+from equimorph.structures.rod.planar_energy import PlanarEnergy
 
 
 @dataclass(frozen=True, eq=False)
@@ -211,18 +213,32 @@ class FrameMechanics(DiscreteStructure):
         return linearise(linearise_lanes, self.tables.shared, self.layout, (z, p, dp))
 
     @cached_property
-    def _assembled(self) -> Float[np.ndarray, "nodes nodes"]:
-        """K with springs."""
-        total = np.diag(self.model.springs)
-        for element, nodes in zip(self.model.stiffness, self.model.nodes, strict=True):
-            total[np.ix_(nodes, nodes)] += element
-        return np.asarray(total)
+    def planar_energy(self) -> PlanarEnergy:
+        """The Lagrangian as tables, with N = −P."""
+        model = self.model
+        points = -model.sine.T, -model.cosine.T, model.stretch[model.owner].T
+        sines, cosines, stretch = (np.ascontiguousarray(each) for each in points)
+        return PlanarEnergy(
+            place=model.place, turned=model.turned, elements=model.nodes,
+            stiffness=model.stiffness, springs=model.springs, slope=model.slope.T,
+            points=model.nodes.ravel(), sine=sines, cosine=cosines, stretch=stretch,
+            tension=np.zeros_like(sines), softness=model.softness, quadratic=model.quadratic,
+            pressure=np.zeros(model.scalars),
+        )  # fmt: skip
+
+    def enclosure(self, z: Interval, p: Interval) -> Enclosed:
+        """Bounds over boxes."""
+        return self.planar_energy.bounds(z, p)
+
+    def plain_energy(self) -> dict[str, Any]:
+        """Tables of the Lagrangian."""
+        return self.planar_energy.numbers()
 
     def energy(self, z: Lanes, p: Parameters) -> Values:
         """Energy of members, springs and loads: L − λ·∂L/∂λ, so that constraints add nothing."""
         model, (y, turns, strain) = self.model, self._fields(z, p)
         pulls = self._pulls(y, turns[:, model.nodes.ravel()], strain)
-        total = 0.5 * (multiply(turns, self._assembled) * turns).sum(axis=1)
+        total = 0.5 * (multiply(turns, self.planar_energy.assembled) * turns).sum(axis=1)
         total -= (multiply(y, model.slope.T) * turns).sum(axis=1)
         stored = (1.0 + strain + 0.5 * model.softness * pulls.tension) * pulls.tension
         total -= stored.sum(axis=1)
@@ -235,7 +251,7 @@ class FrameMechanics(DiscreteStructure):
         model, (y, turns, strain) = self.model, self._fields(z, p)
         pulls = self._pulls(y, turns[:, model.nodes.ravel()], strain)
         stretch = 1.0 + strain + model.softness * pulls.tension
-        total = multiply(turns, self._assembled) - multiply(y, model.slope.T)
+        total = multiply(turns, self.planar_energy.assembled) - multiply(y, model.slope.T)
         return np.asarray(total - multiply(stretch * pulls.shear, self._gather))
 
     @cached_property

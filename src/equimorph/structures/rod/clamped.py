@@ -1,21 +1,18 @@
 """PlanarMechanics of the clamped rod: energy, residual, derivatives and solves in batches."""
 
 from functools import cached_property, partial
-from typing import Any
 
 import numpy as np
 
 from equimorph.array_types import Float
 from equimorph.arrays import Lanes, Nodal, Parameters, Sides, Values, Velocity
 from equimorph.linalg import BorderedSolution, CondensedLayout, multiply, no_border
-from equimorph.linalg.intervals import Interval, cosine, join, product, sine
 from equimorph.linalg.lanes import over_lanes
 from equimorph.structures.contract import Symmetry
 from equimorph.structures.equations import (
     Advance,
     AnyBorder,
     Direction,
-    Enclosed,
     LinearSystem,
     Shift,
 )
@@ -30,7 +27,8 @@ from equimorph.structures.rod.clamped_kernels import advance_lanes
 from equimorph.structures.rod.discretisation import Mesh
 from equimorph.structures.rod.fields import ClampedFields
 from equimorph.structures.rod.inertia import inextensible_force, inextensible_inertia
-from equimorph.structures.rod.mechanics import PlanarMechanics, plain_rod
+from equimorph.structures.rod.mechanics import PlanarMechanics
+from equimorph.structures.rod.planar_energy import PlanarEnergy
 from equimorph.structures.rod.profiles import LoadShape
 from equimorph.structures.rod.units import FOUR_PI_SQUARED
 
@@ -144,21 +142,20 @@ class ClampedMechanics(PlanarMechanics):
         over_lanes(second_lanes, self._matrices[1:], arrays, [out])
         return out
 
-    def enclosure(self, z: Interval, p: Interval) -> Enclosed:
-        """Bounds over boxes by interval arithmetic; see `_enclose`."""
-        return _enclose(self, z, p)
-
-    def plain_energy(self) -> dict[str, Any]:
+    @cached_property
+    def planar_energy(self) -> PlanarEnergy:
         """Tables of the energy, as those of `RodModel`: y = (λ, μ, Θ, Δ, q, ν, 1)."""
         nodes, scalars = self.unknowns + 2, self.constraints + PARAMETERS + 1
         sines, cosines, nothing = np.zeros((3, scalars, nodes))
         sines[1], sines[4], cosines[0] = self.mesh.weights, -self.loads, self.mesh.weights
-        turned, span = np.zeros((2, scalars)), np.zeros((scalars, scalars))
-        turned[:, 2], turned[:, 3], span[[0, 5], [5, 0]] = (1.0, -1.0), 1.0, -1.0
-        return plain_rod(
-            stiffness=self.layout.stiffness, turned=turned, quadratic=span, slope=nothing,
-            points=np.arange(nodes), sine=sines, cosine=cosines, tension=nothing,
-            softness=np.zeros(nodes), first=np.ones((), int),
+        turned, span = np.zeros((nodes, scalars)), np.zeros((scalars, scalars))
+        turned[[0, -1], 2], turned[[0, -1], 3], span[[0, 5], [5, 0]] = (1.0, -1.0), 1.0, -1.0
+        return PlanarEnergy(
+            place=np.r_[-1, : self.unknowns, -1], turned=turned,
+            elements=self.mesh.element_nodes, stiffness=self.layout.stiffness,
+            springs=np.zeros(nodes), slope=nothing, points=np.arange(nodes), sine=sines,
+            cosine=cosines, stretch=nothing, tension=nothing, softness=np.zeros(nodes),
+            quadratic=span, pressure=np.zeros(scalars),
         )  # fmt: skip
 
     def effort(self, z: Lanes, p: Parameters) -> Parameters:
@@ -251,38 +248,3 @@ class ClampedMechanics(PlanarMechanics):
         image[:, :n] = -z[:, :n][:, ::-1]
         image[:, -1] = p[:, 2] * total - z[:, -1]
         return image, p * np.array([1.0, -1.0, 1.0, 1.0])
-
-
-# --- bounds over boxes of states ----------------------------------------------------------------
-
-
-def _enclose(rod: ClampedMechanics, z: Interval, p: Interval) -> Enclosed:
-    """F = Kθ + a cos θ − b sin θ, ∫cos θ − ν, ∫sin θ; with a = μm − qR, b = λm.
-
-    Derivatives are formed at all nodes; those by Θ and Δ are differences and sums of those by the
-    two end angles.
-    """
-    m, stiffness = rod.mesh.weights, rod.layout.assembled
-    theta = join([p[:, 1:2] + p[:, :1], z[:, :-2], p[:, 1:2] - p[:, :1]], 1)
-    sin, cos = sine(theta), cosine(theta)
-    along, across = m * sin, m * cos
-    a, b = z[:, -1:] * m - p[:, 2:3] * rod.loads, z[:, -2:-1] * m
-    bending = product(stiffness, theta[:, :, None])[:, :, 0]
-    forces = bending + a * cos - b * sin
-    closing = [across.sum(1)[:, None] - p[:, 3:4], along.sum(1)[:, None]]
-    diagonal = np.diag(stiffness) - (a * sin + b * cos)
-    (lanes, nodes), unknowns = theta.shape, np.r_[1 : rod.unknowns + 1, -2, -1]
-    full = Interval.zeros(lanes, nodes + 2, nodes + 2)
-    full[:, :nodes, :nodes] = stiffness
-    full[:, range(nodes), range(nodes)] = diagonal
-    for at, row in ((-2, -along), (-1, across)):
-        full[:, at, :nodes] = full[:, :nodes, at] = row
-    others = Interval.zeros(lanes, rod.size, 2)
-    others[:, :-2, 0] = -(rod.loads * cos)[:, 1:-1]
-    others[:, -2, 1] = -1.0
-    first, last = full[:, unknowns, :1], full[:, unknowns, nodes - 1 : nodes]
-    return Enclosed(
-        join([forces[:, 1:-1], *closing], 1),
-        full[:, unknowns][:, :, unknowns],
-        join([first - last, first + last, others], 2),
-    )

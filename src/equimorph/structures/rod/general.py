@@ -1,14 +1,12 @@
 """PlanarMechanics of general rods: energy, residual, derivatives and solves in batches."""
 
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
 from equimorph.array_types import Float
 from equimorph.arrays import Flags, Lanes, Nodal, Parameters, Scalars, Sides, Values, Velocity
 from equimorph.linalg import BorderedSolution, CondensedLayout, no_border
-from equimorph.linalg.intervals import Interval
 from equimorph.linalg.lanes import over_lanes
 from equimorph.linalg.sparse import SparseLayout
 from equimorph.structures.contract import Symmetry
@@ -16,19 +14,18 @@ from equimorph.structures.equations import (
     Advance,
     AnyBorder,
     Direction,
-    Enclosed,
     JointEquations,
     Shift,
     Solver,
 )
 from equimorph.structures.rod.discretisation import Reference
 from equimorph.structures.rod.fields import GeneralFields
-from equimorph.structures.rod.general_enclosure import enclose_rod
 from equimorph.structures.rod.general_kernels import linearise_lanes, second_lanes
 from equimorph.structures.rod.general_step_kernels import advance_lanes
 from equimorph.structures.rod.inertia import following, moved_places, place_derivatives
-from equimorph.structures.rod.mechanics import LARGEST_TAIL, PlanarMechanics, plain_rod
+from equimorph.structures.rod.mechanics import LARGEST_TAIL, PlanarMechanics
 from equimorph.structures.rod.model import RodModel, pack_tables
+from equimorph.structures.rod.planar_energy import PlanarEnergy
 from equimorph.structures.rod.pressure import EnclosedArea, lower_triangle
 from equimorph.structures.rod.reflections import symmetries
 from equimorph.tolerances import METRIC_DIFFERENCE
@@ -284,20 +281,19 @@ class GeneralMechanics(JointEquations, PlanarMechanics):
             out[:, : self.unknowns] -= total[:, self.unknown_nodes]
         return out
 
-    def enclosure(self, z: Interval, p: Interval) -> Enclosed | None:
-        """Bounds over boxes; None for rods under pressure."""
-        if self._area is not None:
-            return None
-        return enclose_rod(self.model, self.layout.assembled, self.unknown_nodes, z, p)
-
-    def plain_energy(self) -> dict[str, Any] | None:
-        """Tables of the model; None for rods under pressure."""
-        model = self.model
-        return None if self._area is not None else plain_rod(
-            stiffness=self.layout.stiffness, turned=model.turned, quadratic=model.quadratic,
-            slope=model.slope, points=self.mesh.element_nodes.ravel(), sine=model.sine,
-            cosine=model.cosine, tension=model.tension, softness=model.softness,
-            first=np.array(self.unknown_nodes.start),
+    @cached_property
+    def planar_energy(self) -> PlanarEnergy:
+        """Tables of the model."""
+        model, nodes = self.model, len(self.mesh.nodes)
+        place, turned = np.full(nodes, -1), np.zeros((nodes, model.scalars))
+        place[self.unknown_nodes] = range(self.unknowns)
+        turned[[0, -1]] = model.turned
+        return PlanarEnergy(
+            place=place, turned=turned, elements=self.mesh.element_nodes,
+            stiffness=self.layout.stiffness, springs=np.zeros(nodes), slope=model.slope,
+            points=self.mesh.element_nodes.ravel(), sine=model.sine, cosine=model.cosine,
+            stretch=np.zeros_like(model.sine), tension=model.tension, softness=model.softness,
+            quadratic=model.quadratic, pressure=model.pressure, area=self._area,
         )  # fmt: skip
 
     def solver(

@@ -10,18 +10,15 @@ from equimorph.array_types import Float
 from equimorph.arrays import Flags, Lanes, Nodal, Parameters, Values, Velocity
 from equimorph.errors import InputError
 from equimorph.linalg.condensed import PIVOT_GUARD
+from equimorph.linalg.intervals import Interval
 from equimorph.linalg.lanes import over_lanes
 from equimorph.structures.contract import Symmetry
-from equimorph.structures.equations import Advance, Direction, Equations
+from equimorph.structures.equations import Advance, Direction, Enclosed, Equations
 from equimorph.structures.rod.discretisation import Mesh, error_by_refinement
+from equimorph.structures.rod.planar_energy import PlanarEnergy
 
 LARGEST_TAIL = 1e-3
 """Highest Legendre coefficients of θ, in radians, of an element that represents its part."""
-
-
-def plain_rod(**tables: np.ndarray) -> dict[str, Any]:
-    """Tables of the energy of a planar rod in plain numbers; see `Equations.plain_energy`."""
-    return {"kind": "rod", **{name: each.tolist() for name, each in tables.items()}}
 
 
 class RodMechanics(Equations):
@@ -125,6 +122,19 @@ class PlanarMechanics(RodMechanics):
 
     held: tuple[bool, bool]
     """Whether the angles of the ends are prescribed."""
+
+    @property
+    @abstractmethod
+    def planar_energy(self) -> PlanarEnergy:
+        """The Lagrangian as tables."""
+
+    def enclosure(self, z: Interval, p: Interval) -> Enclosed | None:
+        """Bounds over boxes."""
+        return self.planar_energy.bounds(z, p)
+
+    def plain_energy(self) -> dict[str, Any] | None:
+        """Tables of the Lagrangian."""
+        return self.planar_energy.numbers()
 
     @abstractmethod
     def inertia(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes unknowns unknowns"]:

@@ -33,7 +33,7 @@ class Proof:
         Stability margin that the curve keeps everywhere, 0 if unproved.
     bounds
         "enclosed": over whole boxes with outward rounding; "sampled": estimated from samples, as
-        for frames and rods in space; "structural", in older files: with allowances for round-off.
+        for rods and frames in space; "structural", in older files: with allowances for round-off.
     failed
         First segment for which the bound fails, by its ends.
     tubes
@@ -70,9 +70,9 @@ def prove(states: States, margin: float = 0.0) -> Proof:
     for all parameters on the straight segments between those of the states, that an equilibrium
     exists near the chord, that it is the only one there and continuous, and that its index is 0
     with at least `margin`. This is proved where the structure encloses F and its first derivatives
-    over whole boxes (spring, truss, planar rod, formulas), and supported where they are sampled.
-    A proof counts rounding outward throughout. It is about the discretised structure, with the
-    tables of numbers that it computes with.
+    over whole boxes (spring, truss, planar rod and frame, formulas), and supported where they are
+    sampled. A proof counts rounding outward throughout. It is about the discretised structure, with
+    the tables of numbers that it computes with.
     """
     structure = states.structure
     kind = kind_of_bounds(states)
