@@ -11,7 +11,7 @@ from collections import deque
 from collections.abc import Callable, Hashable, Iterator, KeysView, Mapping, Sequence, ValuesView
 from contextlib import contextmanager
 from dataclasses import is_dataclass
-from functools import partial, wraps
+from functools import cached_property, partial, wraps
 from importlib.abc import MetaPathFinder
 from importlib.machinery import ModuleSpec, PathFinder
 from inspect import isclass
@@ -99,9 +99,8 @@ class _Memory:
 
     def __init__(self, function: FunctionType) -> None:
         self._function = function
-        self._check: Callable[..., Any] | None = None
         self._form = _form_with_values if "Literal" in str(function.__annotations__) else form
-        self._passed = _passed(function)
+        self._known = _known(function)
 
     def identity(self) -> str:
         """For those who tell functions by what they close over: checks change nothing."""
@@ -109,37 +108,55 @@ class _Memory:
 
     def call(self, args: tuple[Any, ...], kwargs: dict[str, Any]) -> Any:
         __tracebackhide__ = True
-        of = self._form
+        of, known = self._form, self._known
         given = (*map(of, args), *kwargs, *map(of, kwargs.values()))
-        results = self._passed.get(given)
+        results = known.passed.get(given)
         if results is None:
-            if self._check is None:
-                self._check = jaxtyped(self._function, typechecker=check)
-            result = self._check(*args, **kwargs)
-            self._passed[given] = {of(result)}
+            result = known.check(self._function, args, kwargs)
+            known.passed[given] = {of(result)}
             return result
         result = self._function(*args, **kwargs)
         if of(result) not in results:
-            _check_result(self._function, result, args, kwargs)
+            # together with the arguments that it was made of, without a second call
+            known.check(lambda *_, **__: result, args, kwargs)
             results.add(of(result))
         return result
 
 
-def _passed(function: FunctionType) -> dict[Hashable, set[Hashable]]:
-    """Forms that passed, shared by the closures that a function makes again and again."""
+class _Known:
+    """Check of a function's annotations, and which forms of arguments with which results passed."""
+
+    def __init__(self, function: FunctionType) -> None:
+        self.passed: dict[Hashable, set[Hashable]] = {}
+        self._function = function
+        self._next: list[Callable[..., Any]] = []
+
+    @cached_property
+    def _checked(self) -> Callable[..., Any]:
+        @wraps(self._function)
+        def call(*args: Any, **kwargs: Any) -> Any:
+            __tracebackhide__ = True
+            return self._next.pop()(*args, **kwargs)
+
+        return jaxtyped(check(call), typechecker=None)
+
+    def check(self, call: Callable[..., Any], args: Any, kwargs: Any) -> Any:
+        """Call something with the function's annotations; raise if these are not obeyed."""
+        __tracebackhide__ = True
+        before = len(self._next)
+        self._next.append(call)
+        try:
+            return self._checked(*args, **kwargs)
+        finally:
+            del self._next[before:]  # arguments that do not pass leave the call undone
+
+
+def _known(function: FunctionType) -> _Known:
+    """What is known of a function, and shared by the closures that one makes again and again."""
     if function.__closure__ is None:
-        return {}
-    return CLOSURES.setdefault((function.__code__, *function.__annotations__.items()), {})
-
-
-def _check_result(function: FunctionType, result: Any, args: Any, kwargs: Any) -> None:
-    """Check a result together with the arguments that it was made of, without a second call."""
-
-    def call(*_: Any, **__: Any) -> Any:
-        return result
-
-    again = FunctionType(call.__code__, function.__globals__, closure=call.__closure__)
-    jaxtyped(wraps(function)(again), typechecker=check)(*args, **kwargs)
+        return _Known(function)
+    key = (function.__code__, *function.__annotations__.items())
+    return CLOSURES.setdefault(key, _Known(function))
 
 
 def form(value: Any) -> Hashable:
@@ -190,4 +207,4 @@ def _other_form(value: Any) -> Hashable:
 
 
 FORMS: dict[type, Callable[[Any], Hashable]] = {}
-CLOSURES: dict[Hashable, dict[Hashable, set[Hashable]]] = {}
+CLOSURES: dict[Hashable, _Known] = {}
