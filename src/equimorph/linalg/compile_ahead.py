@@ -150,8 +150,8 @@ def _share(calls: Iterable[KernelCall]) -> None:
 def main() -> None:
     """Compile all calls, or, as a helper, a share of those whose numbers are given."""
     known = known_calls()
+    gc.disable()  # compiling makes many objects that live on; this process ends soon
     if numbers := sys.argv[1:]:
-        gc.disable()  # compiling makes many objects that live on; this process ends soon
         _share([known[int(each)] for each in numbers])
     else:
         compile_ahead(known)

@@ -48,7 +48,7 @@ def oscillate(schedule, start, eta, steps):
 
 
 @pytest.mark.parametrize(
-    "seed", [0, 1, *(pytest.param(each, marks=pytest.mark.slow) for each in range(2, 6))]
+    "seed", [0, *(pytest.param(each, marks=pytest.mark.slow) for each in range(1, 6))]
 )
 def test_the_spring_stays_within_the_bound_at_the_limit(seed):
     """Random legs of a stretched spring: never exceeded, at most 6 times too careful."""
