@@ -2,13 +2,15 @@
 
 ``python benchmarks/list_kernel_calls.py`` after the tests, the slow ones, too, have run since the
 last change of a kernel. Those of the package that are called from Python are listed, the largest
-code first; those that a set of a small spring needs are marked.
+code first. Marked are those that a set of a small spring needs, and of those that one of an arch
+needs what belongs to sets of any structure.
 """
 
 import ast
 import re
 from importlib import import_module
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from numba import typeof
 from numba.core.dispatcher import Dispatcher
@@ -17,13 +19,14 @@ import equimorph as em
 from equimorph.linalg.compile_ahead import LIST
 
 PACKAGE = Path(em.__file__).parent
+OF_SETS = ("equimorph.equilibria.", "equimorph.manifold.")
 ARRAY = re.compile(r"Array\((\w+), (\d), 'C', False, aligned=True\)")
 
 
 def main() -> None:
     """Write the list."""
     kernels = [each for name in sorted(called_from_python()) if (each := kernel(name)) is not None]
-    common = calls_of_a_small_set()
+    common = calls_of_small_sets()
     rows = []
     for name, dispatcher in kernels:
         index = dispatcher._cache._cache_file._load_index()
@@ -60,8 +63,8 @@ def kernel(name: str) -> tuple[str, Dispatcher] | None:
     return (name, found) if isinstance(found, Dispatcher) else None
 
 
-def calls_of_a_small_set() -> set[tuple[str, tuple[object, ...]]]:
-    """Calls of kernels while equilibria of a spring are found, followed and joined to a set."""
+def calls_of_small_sets() -> set[tuple[str, tuple[object, ...]]]:
+    """Calls of kernels while equilibria are found, followed and joined to a set."""
     made, compile_here = set(), Dispatcher._compile_for_args
 
     def note(self: Dispatcher, *args: object) -> object:
@@ -69,12 +72,17 @@ def calls_of_a_small_set() -> set[tuple[str, tuple[object, ...]]]:
         return compile_here(self, *args)
 
     Dispatcher._compile_for_args = note
-    spring = em.Spring()
+    spring, arch = em.Spring(), em.Rod(load="uniform")
     em.equilibrium_set(spring, em.Box(x_l=(0.4, 1.4), F=(-0.3, 0.3)), intervals=(4, 4))
     em.find_equilibria(spring, {"x_l": 0.8, "F": 0.0})
     em.limit_load(spring.natural_state(x_l=0.8), "F")
+    by_spring = set(made)
+    box, within = em.Box(Theta=(0.2, 2.5), Delta=(-2.0, 2.0)), [arch.max_curvature <= 20]
+    eset = em.equilibrium_set(arch, box, fixed={"q": 2.5}, within=within, intervals=(5, 9))
+    with TemporaryDirectory() as folder:
+        em.explore(eset, {}, Path(folder) / "page.html")
     Dispatcher._compile_for_args = compile_here
-    return made
+    return by_spring | {each for each in made if each[0].startswith(OF_SETS)}
 
 
 def text(types: tuple[object, ...]) -> str:
