@@ -49,13 +49,14 @@ def main(seed: int = 1) -> np.ndarray:
 def figure(result: np.ndarray) -> Axes:
     """Load, what is believed of it, and the height of the crown."""
     steps = np.arange(len(result))
-    above, below = Figure(figsize=(3.4, 3.2), layout="constrained").subplots(2, sharex=True)
-    above.step(steps, result[:, 0], label="load", where="post")
-    above.plot(steps, result[:, 1], ".", label="estimated")
-    above.set_ylabel("load")
-    above.legend(frameon=False)
-    below.plot(steps, result[:, 2])
-    below.set(xlabel="step", ylabel="height of the crown")
+    with em.plotting.house_style():
+        above, below = Figure(figsize=(3.4, 3.2), layout="constrained").subplots(2, sharex=True)
+        above.step(steps, result[:, 0], label="load", where="post")
+        above.plot(steps, result[:, 1], ".", label="estimated")
+        above.set_ylabel("load, λ_cr")
+        above.legend(frameon=False)
+        below.plot(steps, result[:, 2])
+        below.set(xlabel="step", ylabel="height of the crown, L")
     return below
 
 

@@ -14,15 +14,15 @@ DOCS = ROOT / "docs"
 sys.path.insert(0, str(DOCS / "extensions"))
 from public_names import descriptors_of, groups, slug  # noqa: E402
 
-PAGES = [*DOCS.glob("*.md"), *DOCS.glob("tutorial/*.md"), *DOCS.glob("reference/*.md")]
-PAGES = [page for page in PAGES if not page.name.endswith(".inc.md")]
+FOLDERS = ("tutorial", "reference", "compared")
+RUN = [page for folder in FOLDERS for page in DOCS.glob(f"{folder}/*.md")]
+PAGES = [page for page in (*DOCS.glob("*.md"), *RUN) if not page.name.endswith(".inc.md")]
 GENERATED = ("reference/names/", "reference/descriptors.md", "gallery/")
 BLOCK = re.compile(r"```python\n(.*?)```", re.DOTALL)
 LINK = re.compile(r"(?<!`)\[[^\]]*\]\(([^)\s]+)\)")
 SAID = re.compile(r"^ *(?:print\(.*|\))  # (.*)$", re.MULTILINE)
 """What a call of print, in one line or several, says that it prints."""
 QUICK = {"errors", "map-limit-loads", "sections-materials-and-loads", "strip", "truss"}
-RUN = [*DOCS.glob("tutorial/*.md"), *DOCS.glob("reference/*.md")]
 RUN = [page for page in RUN if BLOCK.search(page.read_text(encoding="utf-8"))]
 
 

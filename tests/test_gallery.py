@@ -13,7 +13,7 @@ from equimorph.study.problem import parse_study
 from typecheck import unchecked
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
-NAMES = ("arch", "strip", "arm", "beam", "deep_arch", "stack", "truss")
+NAMES = ("arch", "strip", "arm", "beam", "deep_arch", "stack", "truss", "column")
 
 
 def study(name):
@@ -75,6 +75,32 @@ def test_the_stack_has_nine_equilibria_four_of_them_stable():
     with unchecked():
         found = em.find_equilibria(truss, {"a": 0.001, "F": 0.0})
     np.testing.assert_array_equal(np.sort(found.index), [0, 0, 0, 0, 1, 1, 1, 1, 2])
+
+
+def test_a_truss_that_snaps_back_has_the_limit_points_of_one_that_snaps_through():
+    """[Mises1923]_, l³ = L² l₀; a bar in series adds F/k to the displacement. 1e-9: round-off."""
+    module = example("limit_points")
+    with unchecked():
+        found = module.main()
+    length = np.cbrt(np.hypot(1.0, module.RISE))
+    y = np.sqrt(length**2 - 1.0)
+    load = 2.0 * y * (1.0 / length - length**-3)
+    for joint, softness in (("B", 0.0), ("D", 1.0 / module.STIFFNESS)):
+        folds = module.limits(found[joint])
+        move = folds[0].structure.displacement(joint, "y")
+        for fold, side in zip(folds, (1.0, -1.0), strict=True):
+            assert fold["F"] == pytest.approx(side * load, rel=1e-9)
+            down = module.RISE - side * y + side * softness * load
+            assert -move(fold) == pytest.approx(down, rel=1e-6)
+
+
+def test_the_column_buckles_where_its_example_says():
+    """P = (3 − √5)/2 k. 1e-9: located to round-off."""
+    column = example("column").column()
+    assert column.signature == study("column").structure.signature
+    assert em.limit_load(column.natural_state(), "P").value == pytest.approx(
+        (3.0 - np.sqrt(5.0)) / 2.0, rel=1e-9
+    )
 
 
 @pytest.mark.slow

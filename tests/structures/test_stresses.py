@@ -8,6 +8,7 @@ import pytest
 import equimorph as em
 from equimorph.errors import MissingError
 from equimorph.structures.quantities import find_descriptor
+from equimorph.structures.unit_system import unit_system
 
 STEEL = em.Strip("20 mm", "0.5 mm", E="210 GPa", nu=0.3)
 UNITS = {"force": "N", "length": "mm"}
@@ -77,6 +78,9 @@ def test_a_bound_of_the_stress_ends_a_path_where_that_of_the_curvature_does(stri
          "that is straight when free of stress"),
         (lambda: em.Rod(section=STEEL, length="320 mm", units=UNITS,
                         actuators={"h": em.Curvature()}), "that is straight when free of stress"),
+        (lambda: em.SpatialRod(torsion=0.8, lateral=1.0), "without the size of"),
+        (lambda: em.SpatialRod(section=STEEL, length="320 mm", units=UNITS, natural_twist=0.001),
+         "that is straight when free of stress"),
     ],
 )  # fmt: skip
 def test_strain_of_other_rods_is_refused(rod, words):
@@ -104,3 +108,52 @@ def test_efforts_have_symbols_and_units(strip):
              (spring, "F"))]  # fmt: skip
     assert told == [("M(Theta)", "N mm"), ("Q(q)", "mm²"), ("M(Delta)", "4π²B/L"), ("−δ(q)", "L"),
                     ("F(x_l)", "force"), ("−δ(F)", "length")]  # fmt: skip
+
+
+# --- in space -------------------------------------------------------------------------------------
+
+WIRE = em.Round("2 mm", E="70 GPa", nu=0.33)
+
+
+@pytest.mark.parametrize("section", [STEEL, WIRE])
+def test_a_planar_state_bears_in_space_what_it_bears_in_its_plane(section):
+    """The same rod as a planar one; 1e-6: both discretisations."""
+    rod = em.SpatialRod(section=section, length="320 mm", units=UNITS, elements=3, degree=5)
+    flat = em.Rod(section=section, length="320 mm", units=UNITS, elements=4, degree=5)
+    bent, arc = rod.natural_state(Theta=1.0), flat.natural_state(Theta=1.0)
+    for one in (rod.max_strain, rod.max_stress, rod.safety_factor("900 MPa")):
+        assert one(bent) == pytest.approx(flat.descriptor(one.name)(arc), rel=1e-6)
+
+
+def test_a_wire_bears_the_stress_of_its_couples():
+    """Bent and twisted, unloaded: M(s) = r × F − M_A, and σ = √((M r/I)² + 3 (T r/J)²).
+
+    1e-5: the largest of 2001 arclengths.
+    """
+    wire = em.SpatialRod(section=WIRE, length="320 mm", units=UNITS, elements=3, degree=5)
+    flat = wire.natural_state(Theta=1.0)
+    turned = em.lift(flat, {"twist_A": 1.0, "Theta": 0.8}).end.state
+    z, p, s = turned.z[None], turned.p[None], np.linspace(0.0, 1.0, 2001)
+    couple = np.array([wire.end_couple(0, axis)(turned) for axis in "xyz"])
+    force = np.array([wire.support_force(axis)(turned) for axis in "xyz"])
+    moments = np.cross(wire.places(z, p, s)[0], force) - couple
+    twist, *bends = np.einsum("sia,si->as", wire.frames(z, p, s)[0], moments)
+    assert np.abs(twist).min() > 20.0
+    stress = np.hypot(np.hypot(*bends), 0.5 * np.sqrt(3.0) * twist) / (np.pi / 4.0)
+    assert wire.max_stress(turned) == pytest.approx(stress.max(), rel=1e-5)
+    bound = wire.max_stress <= 0.9 * stress.max()
+    assert em.lift(flat, {"twist_A": 1.0, "Theta": 0.8}, within=[bound]).end.kind == "constraint"
+
+
+@pytest.mark.parametrize(
+    ("ratio", "share"), [(1.0, 0.675), (1.2, 0.759), (1.5, 0.848), (2.0, 0.930), (4.0, 0.997)]
+)
+def test_a_twisted_rectangle_bears_the_printed_shear(ratio, share):
+    """τ = k G κ t in the middle of the long side [TimoshenkoGoodier1970]_, table of section 109."""
+    for width, thickness in ((ratio, 1.0), (1.0, ratio)):
+        section = em.Strip(width, thickness, E=2.6, nu=0.3).fibres(unit_system(None))
+        twisted = np.array([[[1.0, 0.0, 0.0]]])
+        assert section.stress(twisted).item() == pytest.approx(np.sqrt(3.0) * share, abs=1e-3)
+        bent = np.array([[[0.0, 0.5, 0.25]]])  # the corner
+        assert section.strain(bent).item() == pytest.approx(0.25 * width + 0.125 * thickness)
+        assert section.stress(bent).item() == pytest.approx(2.6 * section.strain(bent).item())

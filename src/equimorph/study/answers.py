@@ -1,6 +1,6 @@
 """What answers of several kinds have in common: states of the set, ways on it, snaps on a way."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
 from html import escape
 from typing import Literal
@@ -67,7 +67,7 @@ def figures_of_way(
     name: str,
     route: Route,
     what: str,
-    bounds: tuple[Constraint, ...] = (),
+    bounds: Iterable[Constraint] = (),
 ) -> list[Figure]:
     """Shapes and margins; the plane (alone if refused) and a film over two parameters.
 

@@ -1,8 +1,4 @@
-"""Descriptors of a rod as methods; those of strain, stress and safety need its section.
-
-The outermost fibre of an inextensible rod has the strain ε = κ t/2 of bending, with the thickness t
-in the plane, and the stress σ = E ε. Axial stresses are smaller by t/(6 L) and are left out.
-"""
+"""Descriptors of a planar rod as methods."""
 
 from abc import abstractmethod
 from functools import cached_property
@@ -18,48 +14,20 @@ from equimorph.model import Constraint, Descriptor, remember_call
 from equimorph.model.descriptor import Branches
 from equimorph.structures.contract import Readers, Written
 from equimorph.structures.rod import space
-from equimorph.structures.rod.any_rod import AnyRod, Field, Peaks
+from equimorph.structures.rod.any_rod import Field, Peaks
 from equimorph.structures.rod.ends import End
 from equimorph.structures.rod.extrema import extreme_curvatures, peaks, stations
 from equimorph.structures.rod.lateral import Holding, LateralStiffness, OutOfPlane
 from equimorph.structures.rod.measured import Measured
 from equimorph.structures.rod.model import RodModel
-from equimorph.structures.rod.sections import CrossSection, Fibre
 from equimorph.structures.rod.space import LateralMode
 from equimorph.structures.rod.space_options import SpaceOptions
-from equimorph.structures.rod.units import SI
+from equimorph.structures.rod.stresses import StressedRod
 from equimorph.structures.states import State
-from equimorph.structures.unit_system import Quantity, UnitSystem
-
-SAFEST = 1e6
-"""Largest safety factor: that of a straight rod has no bound."""
 
 
-def outermost_fibre(section: CrossSection | None, system: UnitSystem, bent: bool) -> Fibre:
-    """Fibre with the largest strain.
-
-    Raises
-    ------
-    MissingError
-        If there is no section of a shape, or the curvature is not that of bending alone.
-    """
-    fibre = None if section is None else section.fibre(system)
-    if fibre is None:
-        raise MissingError(
-            "`max_strain` must be that of a rod with a section, like Rod(section=Strip(...), "
-            "length=...), Round or Tube; got a rod without the size of its section."
-        )
-    if bent:
-        raise MissingError(
-            "`max_strain` must be that of a uniform rod that is straight when free of stress; got "
-            "one with its own curvature, a curvature load or a profile of stiffness. Bound its "
-            "curvature instead."
-        )
-    return fibre
-
-
-def multiple(given: Descriptor, factor: float, name: str, unit: str, symbol: str) -> Descriptor:
-    """Descriptor that is a positive multiple of another one, with its places and branches."""
+def multiple(given: Descriptor, factor: float, names: tuple[str, str, str]) -> Descriptor:
+    """Descriptor of a name, unit and symbol that is a positive multiple of another one."""
 
     def value(z: Lanes, p: Parameters) -> Values:
         return factor * given.function(z, p)
@@ -72,25 +40,8 @@ def multiple(given: Descriptor, factor: float, name: str, unit: str, symbol: str
             values, places = inner(z, p)
             return factor * values, places
 
+    name, unit, symbol = names
     return Descriptor(name, unit, value, symbol, given.origin, given.place, branches)
-
-
-def safety(stress: Descriptor, strength: float, written: str) -> Descriptor:
-    """Descriptor of a strength over a stress, at most 1e6.
-
-    Raises
-    ------
-    InputError
-        If the strength is not positive.
-    """
-    if not strength > 0.0:
-        raise InputError(f"`strength` must be positive; got {written}.")
-
-    def value(z: Lanes, p: Parameters) -> Values:
-        return strength / np.maximum(stress.function(z, p), strength / SAFEST)
-
-    name = f"safety_factor({written})"
-    return Descriptor(name, "1", value, "safety factor", stress.origin, stress.place)
 
 
 FORCES = {"x": 0, "y": 1, "lambda": 0, "mu": 1}
@@ -105,10 +56,7 @@ class Described(Measured):
         "x(s)": lambda rod, s: rod.coordinate(0, s),
         "angle(s)": "angle",
         "curvature(s)": "curvature",
-        **AnyRod.written,
-        "max_strain": "max_strain",
-        "max_stress": "max_stress",
-        "safety_factor(strength)": "safety_factor",
+        **StressedRod.written,
         "lateral_margin": "lateral_margin",
         "lateral_margin(torsion,lateral)": "lateral_margin",
         "lateral_index": "lateral_index",
@@ -116,9 +64,8 @@ class Described(Measured):
         "end_moment(0)": "end_moment",
     }
     readers: ClassVar[Readers] = {
-        **AnyRod.readers,
+        **StressedRod.readers,
         **dict.fromkeys(("torsion", "lateral"), space.number_or_text),
-        "strength": str,
     }
 
     @property
@@ -171,7 +118,9 @@ class Described(Measured):
         MissingError
             Without the size of the section, or for a rod that is curved when free of stress.
         """
-        return multiple(self.max_curvature, self._fibre.distance, "max_strain", "1", "max |ε|")
+        return multiple(
+            self.max_curvature, float(self.fibres.y.max()), ("max_strain", "1", "max |ε|")
+        )
 
     @cached_property
     @remember_call
@@ -183,40 +132,8 @@ class Described(Measured):
         MissingError
             As of `max_strain`.
         """
-        label = self._system.label("force/length²")
-        return multiple(self.max_strain, self._fibre.E, "max_stress", label, "max |σ|")
-
-    @check_arguments
-    @remember_call
-    def safety_factor(self, strength: Quantity) -> Descriptor:
-        """A strength over the largest stress of bending: ``rod.safety_factor("900 MPa") >= 1.5``.
-
-        Parameters
-        ----------
-        strength
-            Stress that the material bears, a number in the rod's units or a text.
-
-        Raises
-        ------
-        InputError
-            If it is not positive or no stress, or as of `max_strain`.
-        """
-        number = float(self._system.number(strength, "force/length²", "strength"))
-        return safety(self.max_stress, number, str(strength))
-
-    @property
-    @abstractmethod
-    def is_straight_when_free(self) -> bool:
-        """Whether the rod is uniform, and straight where it is free of stress."""
-
-    @property
-    def _system(self) -> UnitSystem:
-        return SI if self.units.system.plain else self.units.system
-
-    @property
-    def _fibre(self) -> Fibre:
-        bent = not self.is_straight_when_free
-        return outermost_fibre(self.space_options.section, self._system, bent)
+        names = "max_stress", self.stress_label, "max |σ|"
+        return multiple(self.max_strain, self.fibres.E, names)
 
     def _peaks(self, z: Lanes, p: Parameters) -> tuple[Peaks, Peaks]:
         """Local maxima of |κ|, and the arclengths where they are."""

@@ -4,12 +4,13 @@ import numpy as np
 
 from equimorph.array_types import Float
 from equimorph.arrays import Lanes, Parameters, Values, Velocity
-from equimorph.structures.rod.any_rod import AnyRod, Arclengths
+from equimorph.structures.rod.any_rod import Arclengths
 from equimorph.structures.rod.centreline import Centreline
 from equimorph.structures.rod.mechanics import PlanarMechanics
+from equimorph.structures.rod.stresses import StressedRod
 
 
-class Measured(AnyRod):
+class Measured(StressedRod):
     """A planar rod with its angles, curvature and places."""
 
     mechanics: PlanarMechanics

@@ -33,7 +33,7 @@ from equimorph.structures.rod.profiles import (
 from equimorph.structures.rod.sections import CrossSection
 from equimorph.structures.rod.space import check_terms
 from equimorph.structures.rod.space_options import SpaceOptions
-from equimorph.structures.rod.terms import Curvature, LineLoad, Term, Terms
+from equimorph.structures.rod.terms import LineLoad, Term, Terms
 from equimorph.structures.unit_system import Quantity, Units
 
 DEFAULT_SPAN = float(np.sin(1.0))
@@ -270,16 +270,6 @@ class Rod(Described):
         assert self._load is not None
         kinks = np.union1d(self._load.kinks, self._breaks)
         return ClampedMechanics(mesh_with_kinks(kinks, elements, degree), self._load)
-
-    @property
-    def is_straight_when_free(self) -> bool:
-        """Whether the rod is uniform, and straight where it is free of stress."""
-        if self._general is None:
-            return True
-        own, usual = self._general.profiles, self._general.defaults
-        loads = (one for terms in self.terms.values() for one in terms)
-        same = all(own[name] == usual[name] for name in ("stiffness", "curvature"))
-        return same and not any(isinstance(one, Curvature) for one in loads)
 
     def _natural(self, p: Parameters) -> Natural:
         """Natural states and how each was met."""

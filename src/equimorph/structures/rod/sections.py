@@ -10,11 +10,9 @@ import numpy as np
 from equimorph.argument_checks import check_arguments
 from equimorph.argument_vocabulary import Range
 from equimorph.errors import InputError, suggestion
+from equimorph.structures.rod.fibres import Fibres, circle, rectangle, torsion_constant
 from equimorph.structures.rod.units import SI
 from equimorph.structures.unit_system import Quantity, Units, UnitSystem, unit_system
-
-SERIES = 2.0 * np.arange(500) + 1.0
-"""Odd numbers of the torsion series: what follows them is 1e-13 of the whole."""
 
 
 @check_arguments
@@ -53,14 +51,6 @@ class SectionProperties:
         return self.EI_out / self.EI
 
 
-@dataclass(frozen=True)
-class Fibre:
-    """The outermost fibre in the plane: distance from the axis, and Young's modulus."""
-
-    distance: float
-    E: float
-
-
 class CrossSection(ABC):
     """A cross-section of a rod; its numbers are in the units of the rod, texts have their own."""
 
@@ -93,8 +83,8 @@ class CrossSection(ABC):
         names = [each.name for each in fields(self)]  # type: ignore[arg-type]  # as below
         return {name: getattr(self, name) for name in names if name not in ("nu", "density")}
 
-    def fibre(self, system: UnitSystem) -> Fibre | None:
-        """Outermost fibre in the plane, in a system of units; None where the size is not known."""
+    def fibres(self, system: UnitSystem) -> Fibres | None:
+        """Fibres in the surface, in a system of units; None where the size is not known."""
         del system
         return None
 
@@ -121,16 +111,17 @@ PoissonRatio = Annotated[
 class _Shape(CrossSection):
     """A section of one isotropic material."""
 
-    across: ClassVar[str]
-    """Its size in the plane of the rod."""
     E: Quantity
     nu: PoissonRatio
     density: Quantity | None
 
-    def fibre(self, system: UnitSystem) -> Fibre:
-        """Half the thickness or diameter from the axis."""
-        size = self._number(self.across, "length", system)
-        return Fibre(0.5 * size, self._number("E", "force/length²", system))
+    def fibres(self, system: UnitSystem) -> Fibres:
+        """Fibres in the surface, in a system of units."""
+        return self._surface(system, self._number("E", "force/length²", system))
+
+    def _surface(self, system: UnitSystem, young: float) -> Fibres:
+        """That of a circle."""
+        return circle(self._number("diameter", "length", system), young, self.nu)
 
     def _stiffnesses(
         self, area: float, second: tuple[float, float], torsion: float, system: UnitSystem
@@ -193,31 +184,15 @@ class Strip(_Shape):
     nu: PoissonRatio
     density: Quantity | None = None
     word: ClassVar[str] = "strip"
-    across: ClassVar[str] = "thickness"
 
     def _in(self, system: UnitSystem) -> SectionProperties:
         w, t = (self._number(name, "length", system) for name in ("width", "thickness"))
         second = (w * t**3 / 12.0, t * w**3 / 12.0)
         return self._stiffnesses(w * t, second, torsion_constant(w, t), system)
 
-
-def torsion_constant(width: float, thickness: float) -> float:
-    """J of a rectangle, GJ being its torsional stiffness, to 1e-12.
-
-    ``J = a b³/3 · (1 − 192 b/(π⁵ a) Σ tanh(nπ a/(2b))/n⁵)`` over odd n, with sides a ≥ b.
-
-    References
-    ----------
-    [TimoshenkoGoodier1970]_, section 109.
-
-    Examples
-    --------
-    >>> round(torsion_constant(1.0, 1.0), 6)
-    0.140577
-    """
-    a, b = max(width, thickness), min(width, thickness)
-    series = np.sum(np.tanh(SERIES * np.pi * a / (2.0 * b)) / SERIES**5)
-    return float(a * b**3 / 3.0 * (1.0 - 192.0 * b / (np.pi**5 * a) * series))
+    def _surface(self, system: UnitSystem, young: float) -> Fibres:
+        w, t = (self._number(name, "length", system) for name in ("width", "thickness"))
+        return rectangle(w, t, young, self.nu)
 
 
 @check_arguments
@@ -249,7 +224,6 @@ class Tube(_Shape):
     nu: PoissonRatio
     density: Quantity | None = None
     word: ClassVar[str] = "tube"
-    across: ClassVar[str] = "diameter"
 
     def _in(self, system: UnitSystem) -> SectionProperties:
         d, wall = (self._number(name, "length", system) for name in ("diameter", "wall"))
@@ -279,7 +253,6 @@ class Round(_Shape):
     nu: PoissonRatio
     density: Quantity | None = None
     word: ClassVar[str] = "round"
-    across: ClassVar[str] = "diameter"
 
     def _in(self, system: UnitSystem) -> SectionProperties:
         return self._annulus(self._number("diameter", "length", system), 0.0, system)

@@ -1,5 +1,6 @@
 """Rods in space as structures: fields along the rod and descriptors, in the user's units."""
 
+from collections.abc import Callable
 from functools import cached_property
 from typing import ClassVar
 
@@ -11,13 +12,11 @@ from equimorph.arrays import Lanes, Parameters, Values, Velocity
 from equimorph.errors import InputError
 from equimorph.model import Descriptor, remember_call
 from equimorph.structures.contract import Written
-from equimorph.structures.rod.any_rod import (
-    AnyRod,
-    Arclengths,
-    Field,
-    arclengths,
-)
+from equimorph.structures.rod.any_rod import Arclengths, Field, Peaks, arclengths
 from equimorph.structures.rod.centreline import Centreline
+from equimorph.structures.rod.extrema import peaks, stations
+from equimorph.structures.rod.fibres import Sizes, Strains
+from equimorph.structures.rod.stresses import StressedRod
 from equimorph.structures.spatial.fields import Fields, SpatialFields
 from equimorph.structures.spatial.mechanics import SpatialMechanics
 from equimorph.structures.spatial.orbits import on_orbit
@@ -35,7 +34,7 @@ FORCES = {"lambda": 0, "mu": 1, "x": 0, "y": 1, "z": 2}
 """Components of the support's force; the first two as on a planar rod."""
 
 
-class DescribedInSpace(AnyRod):
+class DescribedInSpace(StressedRod):
     """A rod in space with its fields and descriptors, in the user's units."""
 
     written: ClassVar[Written] = {
@@ -45,7 +44,7 @@ class DescribedInSpace(AnyRod):
         **{f"{name}(s)": lambda rod, s, name=name: rod._angle(name, s) for name in ANGLES},
         **{f"{name}(s)": lambda rod, s, name=name: rod._strain(name, s) for name in STRAINS},
         "bending(s)": "bending",
-        **AnyRod.written,
+        **StressedRod.written,
         "end_couple(0,x)": "end_couple",
     }
     mechanics: SpatialMechanics
@@ -165,6 +164,49 @@ class DescribedInSpace(AnyRod):
     def max_curvature(self) -> Descriptor:
         """Largest bending curvature along the rod, in units of 1/L."""
         return self.max_curvature_descriptor()
+
+    @cached_property
+    @remember_call
+    def max_strain(self) -> Descriptor:
+        """Largest strain of bending in the surface of a rod with a `section`.
+
+        Raises
+        ------
+        MissingError
+            Without the size of the section, or for a rod that is curved or twisted when free of
+            stress.
+        """
+        return self._largest("max_strain", "1", "max |ε|", self.fibres.strain)
+
+    @cached_property
+    @remember_call
+    def max_stress(self) -> Descriptor:
+        """Largest stress of von Mises, of bending about both axes and twist.
+
+        Raises
+        ------
+        MissingError
+            As of `max_strain`.
+        """
+        return self._largest("max_stress", self.stress_label, "max σ", self.fibres.stress)
+
+    def _largest(
+        self, name: str, unit: str, symbol: str, size: Callable[[Strains], Sizes]
+    ) -> Descriptor:
+        """Largest value along the rod of what strains give."""
+        at = stations(self.mesh.breaks)
+
+        def found(z: Lanes, p: Parameters) -> tuple[Peaks, Peaks]:
+            return peaks(size(self.fields(z, p, at).strains), at)
+
+        def value(z: Lanes, p: Parameters) -> Values:
+            return np.asarray(found(z, p)[0].max(axis=1))
+
+        def place(z: Lanes, p: Parameters) -> Values:
+            values, places = found(z, p)
+            return np.take_along_axis(places, values.argmax(axis=1)[:, None], axis=1)[:, 0]
+
+        return Descriptor(name, unit, value, symbol, self.signature, place, found)
 
     @check_arguments
     def support_force(self, component: str) -> Descriptor:

@@ -174,7 +174,7 @@ class SpatialRod(DescribedInSpace):
             "axial": number(axial, "force", "axial"),
             "shear": number(shear, "force", "shear"),
         }
-        self.description = SpatialDescription(
+        self._description = SpatialDescription(
             ends,
             profiles | self._ratios(),
             {**own, **(loads or {})},
@@ -325,6 +325,11 @@ class SpatialRod(DescribedInSpace):
         """Supports of the ends, loads, tendons and segments that bend."""
         supports = rod_supports(self.ends, self.centreline(z, p, ENDS))
         return rod_drawing(self, supports, self.description.amplitudes(p), z, p)
+
+    @property
+    def description(self) -> SpatialDescription:
+        """The rod as its user describes it."""
+        return self._description
 
     @property
     def ends(self) -> Ends:

@@ -70,7 +70,7 @@ class MotionKind(Kind[Verification]):
     ) -> list[Figure]:
         """As for a route."""
         route = as_route(answer, "arrived" if answer.verified else "refused")
-        return figures_of_way(eset, question.files, route, "motion")
+        return figures_of_way(eset, question.files, route, "motion", question.within)
 
     def words(self, question: Question, answer: Verification) -> str:
         """Say how long it takes, and how near to instability it leads."""
@@ -160,7 +160,8 @@ class TrackKind(Kind[Tracking]):
         self, question: Question, eset: EquilibriumSet | None, answer: Tracking
     ) -> list[Figure]:
         """As for a route."""
-        return figures_of_way(eset, question.files, as_route(answer, answer.status), "motion")
+        route = as_route(answer, answer.status)
+        return figures_of_way(eset, question.files, route, "motion", question.within)
 
     def words(self, question: Question, answer: Tracking) -> str:
         """Say how near to instability it leads, and whether the actuators come back."""

@@ -115,7 +115,9 @@ class RouteKind(Kind[Routes]):
     ) -> list[Figure]:
         """Shapes, margins, plane and film of the best; all of them on one plane."""
         best = answer[0].bottleneck
-        bounds = () if best is None else (question["objective"].bound(best.value, 0.0),)
+        bounds = [*question.within]
+        if best is not None:
+            bounds.append(question["objective"].bound(best.value, 0.0))
         found = figures_of_way(eset, question.name, answer[0], "route", bounds)
         if len(answer) > 1 and eset is not None:
             draw = partial(plotting.alternative_routes, eset, answer)
@@ -213,7 +215,7 @@ class SampledRouteKind(Kind[Route]):
         self, question: Question, eset: EquilibriumSet | None, answer: Route
     ) -> list[Figure]:
         """Parameters, shapes and margins."""
-        return figures_of_way(None, question.files, answer, "route")
+        return figures_of_way(None, question.files, answer, "route", question.within)
 
     def words(self, question: Question, answer: Route) -> str:
         """Say how it arrived."""
@@ -245,7 +247,9 @@ class VerifyKind(Kind[Verification]):
     ) -> list[Figure]:
         """As for a route."""
         status: Literal["arrived", "refused"] = "arrived" if answer.verified else "refused"
-        return figures_of_way(eset, question.files, as_route(answer, status), "way")
+        return figures_of_way(
+            eset, question.files, as_route(answer, status), "way", question.within
+        )
 
     def words(self, question: Question, answer: Verification) -> str:
         """Say how near to instability it leads, and whether that is proved."""

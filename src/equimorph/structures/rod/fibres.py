@@ -1,0 +1,122 @@
+"""Strains and stresses in the surface of a cross-section that is bent and twisted.
+
+Fibres at the distances y and z from the axes b and n have the strain ε = κ_b y + κ_n z and the
+stress σ = E ε; twist adds the shear τ of Saint-Venant. What counts is the stress of von Mises,
+√(σ² + 3 τ²). It is largest in the surface, since σ is linear and τ² subharmonic.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from equimorph.array_types import Float
+
+TERMS = 2.0 * np.arange(500) + 1.0
+"""Odd numbers of the torsion series: what follows them in J is 1e-13 of the whole."""
+FIBRES = np.sin(np.linspace(0.0, 0.5 * np.pi, 41))
+"""Places of fibres on half a side of a rectangle, closest to each other at the corner."""
+
+Along = Float[np.ndarray, " fibres"]
+Strains = Float[np.ndarray, "lanes points 3"]
+Sizes = Float[np.ndarray, "lanes points"]
+
+
+@dataclass(frozen=True, eq=False)
+class Fibres:
+    """Fibres in the surface of a quarter of a cross-section; others bear no more.
+
+    Attributes
+    ----------
+    y, z
+        Distances from the axes b and n.
+    shear
+        Shear strain for a twist of 1.
+    round
+        Whether all axes are alike: bends about n and b are then one bend, about b.
+    E, nu
+        Young's modulus and Poisson's ratio.
+    """
+
+    y: Along
+    z: Along
+    shear: Along
+    round: bool
+    E: float
+    nu: float
+
+    def strain(self, strains: Strains) -> Sizes:
+        """Largest strain of bending, for twists and curvatures about n and b."""
+        return np.asarray(self._bending(strains).max(axis=-1))
+
+    def stress(self, strains: Strains) -> Sizes:
+        """Largest stress of von Mises, for twists and curvatures about n and b."""
+        sheared = np.abs(strains[..., :1]) * self.shear / (2.0 * (1.0 + self.nu))
+        both = self._bending(strains) ** 2 + 3.0 * sheared**2
+        return np.asarray(self.E * np.sqrt(both.max(axis=-1)))
+
+    def _bending(self, strains: Strains) -> Float[np.ndarray, "lanes points fibres"]:
+        aside, bend = np.abs(strains[..., 1:2]), np.abs(strains[..., 2:])
+        if self.round:
+            return np.asarray(np.hypot(aside, bend) * self.y)
+        return np.asarray(bend * self.y + aside * self.z)
+
+
+def circle(diameter: float, E: float, nu: float) -> Fibres:
+    """One fibre of a circle, with or without a hole."""
+    at = np.array([0.5 * diameter])
+    return Fibres(at, 0.0 * at, at, True, E, nu)
+
+
+def rectangle(width: float, thickness: float, E: float, nu: float) -> Fibres:
+    """Fibres in half of two sides: bent about b over the thickness, about n over the width."""
+    half_width, half = 0.5 * width, 0.5 * thickness
+    sides = (
+        (np.full(len(FIBRES), half), half_width * FIBRES),
+        (half * FIBRES, np.full(len(FIBRES), half_width)),
+    )
+    y, z = np.concatenate(sides, axis=1)
+    shear = [side_shear(half, half_width, FIBRES), side_shear(half_width, half, FIBRES)]
+    return Fibres(y, z, np.concatenate(shear), False, E, nu)
+
+
+def side_shear(distance: float, half: float, at: Along) -> Along:
+    """Shear strain for a twist of 1 along a side of a rectangle.
+
+    ``γ = 2a (1 − 8/π² Σ cosh(nπ y/(2a)) / (n² cosh(nπ b/(2a))))`` over odd n, where the side lies
+    at the distance a from the axis and y = b `at` runs from its middle to its end. Relative error
+    4e-4 at the very end, where γ = 0, and far less before.
+
+    References
+    ----------
+    [TimoshenkoGoodier1970]_, section 109.
+
+    Examples
+    --------
+    The largest shear in a square: 0.675 · 2a.
+
+    >>> round(side_shear(0.5, 0.5, np.zeros(1)).item(), 3)
+    0.675
+    """
+    rate = 0.5 * np.pi * half / distance * TERMS
+    y = np.abs(at)[:, None]
+    ratio = np.exp(rate * (y - 1.0)) * (1.0 + np.exp(-2.0 * rate * y)) / (1.0 + np.exp(-2.0 * rate))
+    return np.asarray(2.0 * distance * (1.0 - 8.0 / np.pi**2 * (ratio / TERMS**2).sum(axis=1)))
+
+
+def torsion_constant(width: float, thickness: float) -> float:
+    """J of a rectangle, GJ being its torsional stiffness, to 1e-12.
+
+    ``J = a b³/3 · (1 − 192 b/(π⁵ a) Σ tanh(nπ a/(2b))/n⁵)`` over odd n, with sides a ≥ b.
+
+    References
+    ----------
+    [TimoshenkoGoodier1970]_, section 109.
+
+    Examples
+    --------
+    >>> round(torsion_constant(1.0, 1.0), 6)
+    0.140577
+    """
+    a, b = max(width, thickness), min(width, thickness)
+    series = np.sum(np.tanh(TERMS * np.pi * a / (2.0 * b)) / TERMS**5)
+    return float(a * b**3 / 3.0 * (1.0 - 192.0 * b / (np.pi**5 * a) * series))
