@@ -158,14 +158,14 @@ def _closure(stop, leads):
 
 
 def compare(row, n, rng):
-    """Closures of a random row, by `word_graph` and by loading in small steps."""
+    """Closures of a random row by `word_graph`, what it leaves open, and those by small steps."""
     data, k, strokes = draw(n, rng)
     rest = at_rest(row, data, k)
     letters = [row.descriptor(f"u{i}") >= data[1][i] for i in range(n)]
     graph = word_graph(rest, strokes, letters)
-    ours = {}
+    ours, undecided = {}, {}
     for word in graph.words[: graph.resting]:
         found = graph.reached(word)
-        assert "not found" not in found.values()
         ours[word] = {each for each, status in found.items() if status == "reached"}
-    return ours, closures(rest, data, k, strokes)
+        undecided[word] = {each for each, status in found.items() if status == "not found"}
+    return ours, undecided, closures(rest, data, k, strokes)
