@@ -35,6 +35,7 @@ SHARED = {
     "lifts": "Largest number of straight lifts.",
     "batch": "Lifts side by side.",
     "reach": "Longest extension of a tree, in scaled parameters.",
+    "slices": "Most sets over two of the actuators.",
     "seed": "Seed of the random numbers.",
     "probability": "With which a route survives normally distributed errors; else all of a box.",
     "accelerations": "Largest changes of rates per unit of time.",
