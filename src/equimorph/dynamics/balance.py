@@ -17,6 +17,8 @@ LARGEST_STEP = 0.5
 CONTRACTION = 0.25
 """Largest ratio of the second Newton step to the first with which a guess is taken to lie on the
 same branch (Deuflhard, Newton Methods for Nonlinear Problems, 2004, §5.1)."""
+PENALTY = 1.0
+"""Stiffness of closures relative to all others with which a stable equilibrium shows itself."""
 NEAR = 1e-3
 """First Newton step, in radians and lengths of the structure, that need not contract."""
 NARROWEST = 1e-7
@@ -65,6 +67,22 @@ class Balance:
         return values, basis @ vectors
 
     @property
+    def stable(self) -> bool:
+        """Whether it is stable.
+
+        So it is where the stiffness is positive definite with some penalty on the constraints.
+        """
+        linkage, size = self.linkage, self.linkage.size
+        whole = linkage.jacobian(self.v, self.multipliers, self.y)
+        free = np.flatnonzero(linkage.free)
+        stiff, closed = whole[np.ix_(free, free)], whole[size:, free]
+        try:
+            np.linalg.cholesky(stiff + PENALTY * np.trace(stiff) * closed.T @ closed)
+        except np.linalg.LinAlgError:
+            return self.least > 0.0
+        return True
+
+    @property
     def least(self) -> float:
         """Square of the lowest angular frequency; negative where the equilibrium is unstable."""
         stiff, mass, _ = self.reduced()
@@ -98,7 +116,7 @@ def balance(
         step *= min(1.0, LARGEST_STEP / max(largest, 1e-300))
         v[linkage.free] += step[:free]
         multipliers += step[free:]
-        if largest < CONVERGED:
+        if largest < CONVERGED or (len(steps) > 1 and largest**3 < CONVERGED * steps[-2] ** 2):
             return Balance(linkage, v, multipliers, y)
     return None
 
@@ -150,7 +168,7 @@ def _next(
     if new is None:
         return None
     moved = np.abs(new.v - here.v).max()
-    return new if moved < LARGEST_STEP and new.least > 0.0 else None
+    return new if moved < LARGEST_STEP and new.stable else None
 
 
 def fold_time(

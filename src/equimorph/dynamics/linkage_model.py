@@ -13,6 +13,8 @@ from equimorph.dynamics.model import Course, Model, Motion, Plant, Points, Row
 from equimorph.dynamics.simulation import Simulation
 from equimorph.structures import State, States
 
+ONE = np.ones(1)
+
 
 class LinkageModel(Model):
     """Chains of links, simulated by MuJoCo."""
@@ -26,7 +28,7 @@ class LinkageModel(Model):
 
     def settings(self, p: Row) -> Settings:
         """Parameters and 1."""
-        return np.append(p, 1.0)
+        return np.concatenate([p, ONE])
 
     def balance(self, state: State) -> Balance | None:
         """The chain's own equilibrium next to a state."""
@@ -130,6 +132,15 @@ class MovingLinkage(Plant):
     def points(self) -> Points:
         """Places of the joints."""
         return self._model.points(self._plant.v)
+
+    @property
+    def place(self) -> np.ndarray:
+        """Joints of the simulation and settings."""
+        return np.concatenate([self._plant.data.qpos, self._y])
+
+    def points_at(self, place: np.ndarray) -> Points:
+        """Places of the joints where it was."""
+        return self._model.points(self._plant.entries(*np.split(place, [-len(self._y)])))
 
     @property
     def speed(self) -> float:

@@ -35,6 +35,15 @@ class Plant(ABC):
         """Places of its points, in the structure's unit of length."""
 
     @property
+    def place(self) -> np.ndarray:
+        """Where it is, as `points_at` takes it."""
+        return self.points
+
+    def points_at(self, place: np.ndarray) -> Points:
+        """Places of its points where it was."""
+        return np.asarray(place)
+
+    @property
     @abstractmethod
     def speed(self) -> float:
         """Largest speed of an unknown of the plant."""

@@ -24,15 +24,9 @@ class TimedCorners:
     times: Float[np.ndarray, " corners"]
     rows: Float[np.ndarray, "corners parameters"]
 
-    def at(self, time: float) -> Row:
-        """All parameters at a time; at rest before the first and after the last one."""
-        k = int(np.searchsorted(self.times, time, side="right")) - 1
-        if k < 0:
-            return np.asarray(self.rows[0])
-        if k >= len(self.times) - 1:
-            return np.asarray(self.rows[-1])
-        share = (time - self.times[k]) / (self.times[k + 1] - self.times[k])
-        return np.asarray(self.rows[k] + share * (self.rows[k + 1] - self.rows[k]))
+    def at(self, time: float | Float[np.ndarray, " n"]) -> Row | Float[np.ndarray, "n parameters"]:
+        """All parameters at times; at rest before the first and after the last one."""
+        return np.stack([np.interp(time, self.times, each) for each in self.rows.T], axis=-1)
 
     @property
     def duration(self) -> float:

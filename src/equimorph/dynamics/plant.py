@@ -5,6 +5,7 @@ See docs/time.md for the model, and docs/decisions.md for what was measured.
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -13,33 +14,29 @@ from equimorph.dynamics.linkage import Linkage
 from equimorph.dynamics.mechanism import Settings, Vector
 from equimorph.dynamics.simulation import Simulation
 from equimorph.dynamics.tree import WORLD, tree_of
-from equimorph.dynamics.writer import Spring, Writer
+from equimorph.dynamics.writer import Writer
 
 Angles = Float[np.ndarray, " bodies"]
 
 
 @dataclass(frozen=True, eq=False)
-class _Rests:
-    """Where all joints, or all tendons, are at rest; those that the settings change come first."""
+class _Drive:
+    """Numbers of the model, or loads, that are a table times the settings."""
 
-    at: Int[np.ndarray, " springs"]
-    rest: Float[np.ndarray, "springs settings"]
-    driven: int
+    into: np.ndarray
+    at: Int[np.ndarray, " numbers"]
+    table: Float[np.ndarray, "numbers settings"]
 
     @classmethod
-    def of(cls, springs: list[Spring]) -> "_Rests":
-        order = sorted(springs, key=lambda each: not each.rest[:-1].any())
-        at = np.array([each.at for each in order], dtype=int)
-        driven = sum(bool(each.rest[:-1].any()) for each in order)
-        rest = np.array([each.rest for each in order]) if order else np.zeros((0, 0))
-        return cls(at, rest, driven)
+    def of(cls, into: np.ndarray, at: Any, table: Float[np.ndarray, "... settings"]) -> "_Drive":
+        """Part of an array, of the shape of the table without its last axis."""
+        number = np.arange(into.size).reshape(into.shape)[at].ravel()
+        return cls(into.reshape(-1), number, table.reshape(len(number), table.shape[-1]))
 
-    def write(self, into: np.ndarray, y: Settings, again: bool) -> None:
-        """Write them into a field of the model; the constant ones only once."""
-        count = self.driven if again else len(self.at)
-        if count:
-            values = self.rest[:count] @ y
-            into[self.at[:count]] = values if into.ndim == 1 else values[:, None]
+    def by(self, settings: Bool[np.ndarray, " settings"]) -> "_Drive":
+        """Those that some of the settings change."""
+        some = self.table[:, settings].any(axis=1)
+        return _Drive(self.into, self.at[some], self.table[some])
 
 
 class LinkagePlant(Simulation):
@@ -61,7 +58,6 @@ class LinkagePlant(Simulation):
         self.linkage, self.tree = linkage, tree_of(linkage)
         writer = Writer(self.tree, step, damping)
         super().__init__(writer.text())
-        self._springs = tuple(_Rests.of(each) for each in writer.springs())
         self._drag, self._step = writer.drag(), step
         self._dragged: Vector | None = None
         self._hinge = np.array([writer.hinge[k] for k in range(len(self.tree.bodies))])
@@ -69,31 +65,49 @@ class LinkagePlant(Simulation):
         self._moved = self._hinge[self._hinged]
         self._carried = np.ascontiguousarray(self.tree.above[:, self._hinged])
         self._slides, self._stretches = writer.slides, writer.stretches
-        self._couples = np.zeros((len(self.tree.bodies), linkage.couples.shape[1]))
-        turning = self.tree.entries >= 0
-        self._couples[turning] = linkage.couples[self.tree.entries[turning]]
-        self._loaded = bool(self.tree.forces.any() or self._couples.any())
-        self._pressed = bool(linkage.pressure.any())
-        self._forces = self.tree.forces
-        self._y: Settings | None = None
+        self._floats = writer.floats
+        self._loaded = bool(linkage.forces.any() or linkage.node_forces.any())
+        self._loaded |= bool(linkage.couples.any() or linkage.pressure.any())
+        self._force, self._couple = np.zeros((len(self._hinge), 2)), np.zeros(len(self._hinge))
+        self._total = np.zeros(len(self._floats))
+        self._pushed = np.array([at for at, _, _ in self._floats], dtype=int)
+        self._drives = self._driven(writer)
+        self._changing: dict[bytes, list[_Drive]] = {}
+        self._qpos, self._applied = self.data.qpos, self.data.qfrc_applied
+
+    def _driven(self, writer: Writer) -> list[_Drive]:
+        """All that the settings change: rests of springs, places of supports, loads."""
+        model, linkage, tree = self.model, self.linkage, self.tree
+        couples = np.zeros((len(tree.bodies), linkage.couples.shape[1]))
+        turning = tree.entries >= 0
+        couples[turning] = linkage.couples[tree.entries[turning]]
+        total = [tree.floating[body][axis] for _, body, axis in self._floats]
+        out = [_Drive.of(self._force, ..., tree.forces), _Drive.of(self._couple, ..., couples)]
+        if total:
+            out.append(_Drive.of(self._total, ..., np.array(total)))
+        fields = (model.qpos_spring[:, None], model.tendon_lengthspring)
+        for field, springs in zip(fields, writer.springs(), strict=True):
+            if springs:
+                at = np.array([each.at for each in springs])
+                rest = np.array([each.rest for each in springs])
+                out.append(_Drive.of(field, at, rest[:, None].repeat(field.shape[1], axis=1)))
+        held = np.isinf(linkage.supports.stiffness)[..., None] * linkage.supports.places
+        places = np.einsum("nas,nax->nxs", held, linkage.supports.axes)
+        standing = [(f"b{k}", body.base) for k, body in enumerate(tree.bodies) if body.base >= 0]
+        worlds = [(f"w{node}", node) for node in range(linkage.nodes)]
+        for kind, field, named in (
+            ("mjOBJ_BODY", model.body_pos, standing), ("mjOBJ_SITE", model.site_pos, worlds),
+        ):  # fmt: skip
+            at = np.array([self._number(kind, name) for name, _ in named], dtype=int)
+            nodes = np.array([node for _, node in named], dtype=int)[at >= 0]
+            out.append(_Drive.of(field, (at[at >= 0], slice(2)), places[nodes]))
+        return out
 
     # --- state ----------------------------------------------------------------------------------
 
     def _number(self, kind: str, name: str) -> int:
         """Number of a named body or site of the simulation; −1 without one."""
         return int(self._mujoco.mj_name2id(self.model, getattr(self._mujoco.mjtObj, kind), name))
-
-    @cached_property
-    def _anchors(self) -> list[tuple[int, int]]:
-        """Bodies of the simulation that stand in the world, and their nodes."""
-        bodies = enumerate(self.tree.bodies)
-        return [(self._number("mjOBJ_BODY", f"b{k}"), b.base) for k, b in bodies if b.base >= 0]
-
-    @cached_property
-    def _sites(self) -> list[tuple[int, int]]:
-        """Sites fixed in the world at which loops are closed, and their nodes."""
-        found = [(self._number("mjOBJ_SITE", f"w{k}"), k) for k in range(self.linkage.nodes)]
-        return [each for each in found if each[0] >= 0]
 
     def start(self, v: Vector, y: Settings) -> None:
         """Place the linkage at rest."""
@@ -110,70 +124,67 @@ class LinkagePlant(Simulation):
             data.qpos[at] = v[entry]
         for at, entry, link in self._stretches:
             data.qpos[at] = v[entry] * self.linkage.lengths.ravel()[link]
+        for at, k, axis in self._floats:
+            member, link = divmod(bodies[k].link, self.linkage.lengths.shape[1])
+            data.qpos[at] = self.linkage.places(v)[member, link, axis]
         self._mujoco.mj_forward(self.model, data)
 
     def set(self, y: Settings) -> None:
         """Set the actuators and loads."""
-        if self._y is not None and np.array_equal(y, self._y):
-            return
-        model, linkage = self.model, self.linkage
-        joints, tendons = self._springs
-        again = self._y is not None
-        self._dragged = self._drag @ (y - self._y) / self._step if self._y is not None else None
-        joints.write(model.qpos_spring, y, again)
-        tendons.write(model.tendon_lengthspring, y, again)
-        held = np.where(np.isinf(linkage.supports.stiffness), linkage.supports.places @ y, 0.0)
-        for at, node in self._anchors:
-            model.body_pos[at, :2] = held[node] @ linkage.supports.axes[node]
-        for site, node in self._sites:
-            model.site_pos[site, :2] = held[node] @ linkage.supports.axes[node]
-        self._force = self._forces @ y
-        self._couple = self._couples @ y
+        drives = self._drives
+        if self._y is not None:
+            self._dragged = self._drag @ (y - self._y) / self._step
+            moves = y != self._y
+            key = moves.tobytes()
+            if key not in self._changing:
+                some = [each.by(moves) for each in self._drives]
+                self._changing[key] = [each for each in some if len(each.at)]
+            drives = self._changing[key]
+        for drive in drives:
+            drive.into[drive.at] = drive.table @ y
         self._y = y.copy()
 
     def step(self) -> None:
         """One step in time; supports that moved since the last one carry their dampers."""
-        self.data.qfrc_applied[:] = 0.0 if self._dragged is None else self._dragged
+        self._applied[:] = 0.0 if self._dragged is None else self._dragged
         self._dragged = None
-        if self._loaded or self._pressed:
+        if self._loaded:
             self._apply()
         self._mujoco.mj_step(self.model, self.data)
 
     def _apply(self) -> None:
         """Generalised forces of the loads: ``Q = Σ R × d`` of what each joint carries."""
-        data, angles = self.data, self._angles()
+        applied, sizes = self._applied, self._sizes()
+        angles = self._carried @ self._qpos[self._moved]
         c, s = np.cos(angles), np.sin(angles)
-        sizes = self._sizes()
-        force = self._force
-        turn = sizes * (c * force[:, 1] - s * force[:, 0]) + self._couple
-        if self._pressed:
-            turn, force = self._press(angles, sizes, turn, force)
-        data.qfrc_applied[self._moved] += turn @ self._carried
+        force, total = self._force, self._total
+        across = force
+        if self._side is not None:  # pressure: on every link a force in its middle
+            own = (sizes * (self._side @ self._y))[:, None] * np.stack([-s, c], axis=1)
+            force = force + self.tree.levers.T @ own
+            across = force - 0.5 * own
+            carried = [self.tree.above[:, k] @ own[:, axis] for _, k, axis in self._floats]
+            total = total + np.array(carried)
+        turn = sizes * (c * across[:, 1] - s * across[:, 0]) + self._couple
+        applied[self._moved] += turn @ self._carried
+        applied[self._pushed] += total
         for at, entry in self._slides:
             node, axis = divmod(entry, 2)
             body = self._body_of_node[node]
-            data.qfrc_applied[at] += force[body] @ self.linkage.supports.axes[node, axis]
+            applied[at] += force[body] @ self.linkage.supports.axes[node, axis]
         for at, _, link in self._stretches:
             body = self._body_of_link[link]
-            data.qfrc_applied[at] += c[body] * force[body, 0] + s[body] * force[body, 1]
+            applied[at] += c[body] * force[body, 0] + s[body] * force[body, 1]
 
-    def _press(
-        self, angles: Angles, sizes: Angles, turn: Angles, force: Float[np.ndarray, "bodies 2"]
-    ) -> tuple[Angles, Float[np.ndarray, "bodies 2"]]:
-        """Add pressure: on every link a force in its middle, to the left of its member."""
-        links = self.linkage.lengths.shape[1]
-        pressure = self.linkage.pressure @ self._y
-        member = np.array([max(body.link, 0) // links for body in self.tree.bodies])
-        side = np.where(self.tree.offsets > 0.0, -1.0, 1.0)
-        size = pressure[member] * sizes * side
-        own = size[:, None] * np.stack([-np.sin(angles), np.cos(angles)], axis=1)
-        carried = self.tree.above.T @ own
-        beyond = carried - 0.5 * own
-        c, s = np.cos(angles), np.sin(angles)
-        return turn + sizes * (c * beyond[:, 1] - s * beyond[:, 0]), force + carried
-
-    def _angles(self) -> Float[np.ndarray, " bodies"]:
-        return np.asarray(self._carried @ self.data.qpos[self._moved])
+    @cached_property
+    def _side(self) -> Float[np.ndarray, "bodies settings"] | None:
+        """Pressure on each body towards its left, by the settings; None without one."""
+        linkage, tree = self.linkage, self.tree
+        if not linkage.pressure.any():
+            return None
+        member = [max(body.link, 0) // linkage.lengths.shape[1] for body in tree.bodies]
+        left = np.where(tree.offsets > 0.0, -1.0, 1.0)
+        return np.asarray(left[:, None] * linkage.pressure[member])
 
     def _sizes(self) -> Float[np.ndarray, " bodies"]:
         if not self._stretches:
@@ -191,20 +202,18 @@ class LinkagePlant(Simulation):
     def _body_of_node(self) -> dict[int, int]:
         return {body.node: k for k, body in enumerate(self.tree.bodies) if body.node >= 0}
 
-    @property
-    def v(self) -> Vector:
+    def entries(self, qpos: Vector, y: Settings) -> Vector:
         """Entries of the linkage; places of nodes that members carry are theirs."""
         linkage, tree = self.linkage, self.tree
-        assert self._y is not None
-        out = linkage.prescribe(np.zeros(linkage.size), self._y)
-        angles = self._angles() - tree.offsets
+        out = linkage.prescribe(np.zeros(linkage.size), y)
+        angles = self._carried @ qpos[self._moved] - tree.offsets
         turning = tree.entries >= 0
         out[tree.entries[turning]] = angles[turning]
         for at, entry in self._slides:
-            out[entry] = self.data.qpos[at]
+            out[entry] = qpos[at]
         flat = linkage.lengths.ravel()
         for at, entry, link in self._stretches:
-            out[entry] = self.data.qpos[at] / flat[link]
+            out[entry] = qpos[at] / flat[link]
         return self._place_carried_nodes(out)
 
     def _place_carried_nodes(self, v: Vector) -> Vector:

@@ -9,7 +9,7 @@ import numpy as np
 from equimorph.argument_checks import check_arguments
 from equimorph.argument_kinds import one_of
 from equimorph.argument_vocabulary import POSITIVE
-from equimorph.array_types import Float, Int
+from equimorph.array_types import Float
 from equimorph.dynamics.model import Course, Model, Plant, landing
 from equimorph.dynamics.motion import TimedCorners, timed_corners
 from equimorph.dynamics.quasistatics import equilibria_along
@@ -32,6 +32,9 @@ PART_OF_SNAP = 0.75
 """Share of the distance to where it comes to rest at which a motion has left the branch."""
 SAME_REST = 1e-4
 """Distance of two equilibria, relative to the structure's size, that are the same."""
+SETTLING = 1.0
+"""Time, in units of T, for which it is held at first at a time: it starts in an equilibrium of its
+own, but for the softness of closures."""
 NEGLIGIBLE = 1e-5
 """Change of the deviation, relative to the structure's size, that is none."""
 
@@ -238,20 +241,22 @@ def _size(points: Float[np.ndarray, "points space"]) -> float:
 
 @dataclass
 class _Record:
-    """What is kept of a plant: places often, the rest at each sample."""
+    """What is kept of a plant: where it is often, the rest at each sample."""
 
     times: list[float]
-    points: list[Float[np.ndarray, "points space"]]
+    places: list[np.ndarray]
+    samples: list[int]
     energy: list[float]
     closure: float = 0.0
 
     def take(self, time: float, plant: Plant, sample: bool) -> None:
-        """Add places, and what belongs to a sample."""
-        self.times.append(time)
-        self.points.append(plant.points)
+        """Add where it is, and what belongs to a sample."""
         if sample:
+            self.samples.append(len(self.times))
             self.energy.append(plant.energy)
             self.closure = max(self.closure, plant.closure)
+        self.times.append(time)
+        self.places.append(plant.place)
 
 
 def _run(model: Model, begin: State, motion: TimedCorners, used: ReplaySettings) -> Replay:
@@ -260,22 +265,18 @@ def _run(model: Model, begin: State, motion: TimedCorners, used: ReplaySettings)
     count = max(1, int(np.ceil(motion.duration / step - 1e-9)))
     often = max(1, count // (SAMPLES * FINE_SAMPLES))
     every = often * max(1, count // (SAMPLES * often))
-    plant, record = model.plant(begin, used.step, used.damping), _Record([], [], [])
-    hold(plant, used)
+    plant, record = model.plant(begin, used.step, used.damping), _Record([], [], [], [])
+    hold(plant, replace(used, hold=SETTLING))
     record.take(0.0, plant, True)
-    samples = [0]
-    for k in range(1, count + 1):
-        plant.set(motion.at(k * step))
+    for k, row in enumerate(motion.at(step * np.arange(1, count + 1)), 1):
+        plant.set(row)
         plant.step()
         sample = k % every == 0 or k == count
         if sample or k % often == 0:
-            if sample:
-                samples.append(len(record.times))
             record.take(k * step, plant, sample)
     held = step * hold(plant, used)
-    samples.append(len(record.times))
     record.take(count * step + held, plant, True)
-    return _judge(model, begin, motion, np.array(samples), plant, record, used)
+    return _judge(model, begin, motion, plant, record, used)
 
 
 def hold(plant: Plant, used: ReplaySettings, still: float = STILL) -> int:
@@ -290,22 +291,25 @@ def hold(plant: Plant, used: ReplaySettings, still: float = STILL) -> int:
 
 
 def _judge(
-    model: Model, begin: State, motion: TimedCorners, samples: Int[np.ndarray, " samples"],
-    plant: Plant, record: _Record, used: ReplaySettings,
+    model: Model, begin: State, motion: TimedCorners, plant: Plant, record: _Record,
+    used: ReplaySettings,
 ) -> Replay:  # fmt: skip
     """Compare a replay with the equilibria of the library and of the chain."""
-    fine, everywhere = np.array(record.times), np.array(record.points)
-    times, points = fine[samples], everywhere[samples]
-    rows = np.array([motion.at(t) for t in times])
+    fine, samples = np.array(record.times), np.array(record.samples)
+    times = fine[samples]
+    points = np.array([plant.points_at(record.places[k]) for k in samples])
+    rows = motion.at(times)
     reference = equilibria_along(model, begin, rows).points
     course = model.statics(begin, motion.at, times, used.damping)
     size = _size(points[0])
-    away = _away(fine, everywhere, times, course)
+    last = float(_away(times, points, times, course)[-1])
     fold = course.fold
     # at rest where the branch has no equilibrium, it is on another one, however near
-    gone = _folded(fold) or bool(away[-1] > DEPARTURE * size) or _elsewhere(plant, course, size)
-    departure = PART_OF_SNAP * float(away[-1])
-    where = _departure(fine, away > departure) if gone else None
+    gone = _folded(fold) or last > DEPARTURE * size or _elsewhere(plant, course, size)
+    departure, where = PART_OF_SNAP * last, None
+    if gone:
+        everywhere = np.array([plant.points_at(each) for each in record.places])
+        where = _departure(fine, _away(fine, everywhere, times, course) > departure)
     expected = course.delay.lateness(departure) if course.delay and gone else float("nan")
     landed = landing(begin.structure, plant.guess(), rows[-1]) if gone else None
     late = float("nan") if where is None or fold is None else where - fold

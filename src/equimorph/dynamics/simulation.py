@@ -19,6 +19,7 @@ class Simulation(ABC):
     """A mechanism that moves in MuJoCo under settings that change in time."""
 
     linkage: Mechanism
+    _y: Settings | None = None
 
     def __init__(self, text: str) -> None:
         self._mujoco = mujoco_module()
@@ -37,10 +38,15 @@ class Simulation(ABC):
     def step(self) -> None:
         """One step in time."""
 
-    @property
     @abstractmethod
-    def v(self) -> Vector:
+    def entries(self, qpos: Vector, y: Settings) -> Vector:
         """Entries of the mechanism; places of nodes that members carry are theirs."""
+
+    @property
+    def v(self) -> Vector:
+        """Entries of the mechanism as it is."""
+        assert self._y is not None
+        return self.entries(self.data.qpos, self._y)
 
     @property
     @abstractmethod

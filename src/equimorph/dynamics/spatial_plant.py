@@ -102,7 +102,7 @@ class SpatialPlant(Simulation):
         self.model.jnt_stiffness.reshape(chain.size, -1)[some, 0] = stiff
         self.model.qpos_spring[some] = (chain.couples @ y)[some] / stiff
         self._targets = (chain.targets @ y)[self._driven]
-        self._force = np.asarray(chain.forces @ y)
+        self._force, self._y = np.asarray(chain.forces @ y), y
 
     def step(self) -> None:
         """One step in time; loads act on the joints as they are at its start."""
@@ -118,10 +118,10 @@ class SpatialPlant(Simulation):
         self._mujoco.mj_step2(self.model, data)
         data.qpos[driven], data.qvel[driven] = self._targets, rates
 
-    @property
-    def v(self) -> Vector:
+    def entries(self, qpos: Vector, y: Settings) -> Vector:
         """Entries of the chain: all joints of the simulation."""
-        return np.array(self.data.qpos)
+        del y
+        return qpos.copy()
 
     @property
     def kinetic(self) -> float:

@@ -23,9 +23,12 @@ class Body:
     node, link
         Its node, and the number of its link among all links; −1 if it is not one.
     base
-        Node held in the world on which it stands; −1 where its parent carries it.
+        Node held in the world on which it stands; −1 where its parent carries it, and where it
+        floats.
     reversed
         Whether a link is built from its end to its start.
+    at_start
+        Whether its parent, a link that floats, carries it at its start.
     """
 
     parent: int
@@ -33,6 +36,12 @@ class Body:
     link: int = -1
     base: int = -1
     reversed: bool = False
+    at_start: bool = False
+
+    @property
+    def floats(self) -> bool:
+        """Whether nothing carries it."""
+        return self.parent == WORLD and self.base < 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +49,9 @@ class Tree:
     """Bodies of a linkage in an order in which parents come first.
 
     Every node with a support stands in the world; members hang on one of their ends. Where the
-    other end is at a node that has its place already, the loop is closed there.
+    other end is at a node that has its place already, the loop is closed there. Members that both
+    ends hold in the world float, carried by the link in their middle and closed at both ends:
+    matrices of two branches are cheaper to factorise than those of one chain.
 
     Attributes
     ----------
@@ -76,6 +87,15 @@ class Tree:
         return out
 
     @cached_property
+    def levers(self) -> Float[np.ndarray, "bodies bodies"]:
+        """1 where the second body is the first one or carries it at its far end."""
+        out = self.above.copy()
+        for k, body in enumerate(self.bodies):
+            if body.at_start:
+                out[self.above[:, k] > 0.0, body.parent] = 0.0
+        return out
+
+    @cached_property
     def sizes(self) -> Float[np.ndarray, " bodies"]:
         """Lengths of the bodies: 0 of nodes."""
         flat = self.linkage.lengths.ravel()
@@ -88,7 +108,7 @@ class Tree:
 
     @cached_property
     def forces(self) -> Float[np.ndarray, "bodies 2 settings"]:
-        """Dead forces at the far end of each body, and of all that it carries."""
+        """Dead forces at the far end of each body, and of all that it carries there."""
         linkage = self.linkage
         own = np.zeros((len(self.bodies), 2, linkage.couples.shape[1]))
         links = linkage.lengths.shape[1]
@@ -102,7 +122,17 @@ class Tree:
                     own[body.parent] += linkage.forces[member, at + 1 if body.reversed else at]
             else:
                 own[k] += linkage.node_forces[body.node]
-        return np.asarray(np.einsum("kj,kxs->jxs", self.above, own))
+        return np.asarray(np.einsum("kj,kxs->jxs", self.levers, own))
+
+    @cached_property
+    def floating(self) -> dict[int, Float[np.ndarray, "2 settings"]]:
+        """Dead forces on the members that float, by the body that carries all others."""
+        links = self.linkage.lengths.shape[1]
+        return {
+            k: self.linkage.forces[body.link // links].sum(axis=0)
+            for k, body in enumerate(self.bodies)
+            if body.floats
+        }
 
     def angles(self, v: Vector) -> Float[np.ndarray, " bodies"]:
         """Angles of the bodies in a configuration of the linkage."""
@@ -141,6 +171,10 @@ def _hang(
 ) -> None:
     """Add the links of a member, and the node at its other end if that has no place yet."""
     start, end = linkage.ends[member].tolist()
+    joined = linkage.lengths.shape[1] > 1 and not np.isfinite(linkage.axial[member]).any()
+    if joined and stands.get(start) == stands.get(end) == WORLD:
+        _float(linkage, member, bodies, closed)
+        return
     backward = start not in stands
     near, far = (end, start) if backward else (start, end)
     links = linkage.lengths.shape[1]
@@ -155,6 +189,23 @@ def _hang(
     if _matters(linkage, far):
         stands[far] = len(bodies)
         bodies.append(Body(parent, node=far))
+
+
+def _float(
+    linkage: Linkage, member: int, bodies: list[Body], closed: list[tuple[int, int]]
+) -> None:
+    """Add the links of a member that nothing carries: its middle one, then those on both sides."""
+    links = linkage.lengths.shape[1]
+    middle, root = links // 2, len(bodies)
+    bodies.append(Body(WORLD, link=member * links + middle))
+    for side, order in enumerate((range(middle - 1, -1, -1), range(middle + 1, links))):
+        parent = root
+        for at in order:
+            back = side == 0
+            first = back and parent == root
+            bodies.append(Body(parent, link=member * links + at, reversed=back, at_start=first))
+            parent = len(bodies) - 1
+        closed.append((parent, int(linkage.ends[member, side])))
 
 
 def _matters(linkage: Linkage, node: int) -> bool:

@@ -63,10 +63,12 @@ class Writer:
         self.linkage = tree.linkage
         self.hinge: dict[int, int] = {}
         self.slides: list[tuple[int, int]] = []
+        self.floats: list[tuple[int, int, int]] = []
         self.stretches: list[tuple[int, int, int]] = []
         self.joint_springs: list[Spring] = []
         self._joints = 0
         self._size = float(self.linkage.lengths.min())
+        self._none = np.zeros((2, self.linkage.couples.shape[1]))
         self._parts = self._bends()
 
     def text(self) -> str:
@@ -90,7 +92,7 @@ class Writer:
 
     def _body(self, k: int, children: dict[int, list[int]]) -> Iterator[str]:
         body, tree = self.tree.bodies[k], self.tree
-        carried = 0.0 if body.parent == WORLD else tree.sizes[body.parent]
+        carried = 0.0 if body.parent == WORLD or body.at_start else tree.sizes[body.parent]
         yield f'<body name="b{k}" pos="{carried} 0 0">'
         if body.link < 0:
             yield from self._node(k)
@@ -121,6 +123,9 @@ class Writer:
 
     def _link(self, k: int) -> Iterator[str]:
         body, linkage = self.tree.bodies[k], self.linkage
+        for axis in (0, 1) if body.floats else ():
+            self.floats.append((self._joints, k, axis))
+            yield self._joint("slide", "1 0 0" if axis == 0 else "0 1 0", 0.0, self._none)
         yield self._hinge(k)
         size = float(self.tree.sizes[k])
         axial = float(linkage.axial.ravel()[body.link])
@@ -135,8 +140,7 @@ class Writer:
 
     def _hinge(self, k: int) -> str:
         self.hinge[k] = self._joints
-        none = np.zeros((2, self.linkage.couples.shape[1]))
-        return self._joint("hinge", "0 0 1", *self._parts[0].get(k, (0.0, none)))
+        return self._joint("hinge", "0 0 1", *self._parts[0].get(k, (0.0, self._none)))
 
     def _joint(self, kind: str, axis: str, stiffness: float, rests: Rests) -> str:
         number = self._joints
