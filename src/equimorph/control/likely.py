@@ -127,6 +127,9 @@ class LikelyLoads:
         change = target.p - source.p
         apart = np.linalg.norm(change / source.structure.scales, axis=1)
         between = np.maximum(np.ceil(apart / REACH - SAME_TO_ROUNDING).astype(int) - 1, 0)
+        bears = np.ones(len(source), bool)
+        if not between.any():
+            return bears
         move = np.repeat(np.arange(len(source)), between)
         number = 1 + np.arange(len(move)) - np.repeat(np.cumsum(between) - between, between)
         share = number / (between[move] + 1)
@@ -135,7 +138,6 @@ class LikelyLoads:
         states, good = moved(source[move], moving, to)
         jumps = replace(self, values=self.values[self.usual :])
         good[good] = jumps.under(states[np.flatnonzero(good)]).safe
-        bears = np.ones(len(source), bool)
         bears[move[~good]] = False
         return bears
 

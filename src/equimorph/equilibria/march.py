@@ -177,17 +177,18 @@ class Block:
         numbers, counts = self._scalars
         good = np.flatnonzero(counts[kernels.STAGE, : self.active] == CONVERGED)
         z, t = self._places[2][good], numbers[kernels.TRIAL, good]
-        states = self._here.take(good).states(z, t)
-        last, here = self._excess[::2, good], self._excess[1::2, good]
+        here = self._here if len(good) == self.active else self._here.take(good)
+        states = here.states(z, t)
+        last, old = self._excess[::2, good], self._excess[1::2, good]
         new = np.array([constraint.excess(*states) for constraint in self.constraints])
         counts[kernels.WHAT, good[(new > 0.0).any(axis=0)]] |= CONSTRAINT
         close = np.empty(new.shape, bool)
-        if kernels.may_graze(last, here, new, good, numbers, close):
+        if kernels.may_graze(last, old, new, good, numbers, close):
             for k, constraint in enumerate(self.constraints):
-                near, values = good[close[k]], (here[k, close[k]], new[k, close[k]])
+                near, values = good[close[k]], (old[k, close[k]], new[k, close[k]])
                 self._refuse_grazing(constraint, near, values, move)
         kept = counts[kernels.STAGE, good] == CONVERGED
-        self._excess[::2, good[kept]] = here[:, kept]
+        self._excess[::2, good[kept]] = old[:, kept]
         self._excess[1::2, good[kept]] = new[:, kept]
 
     def _refuse_grazing(
