@@ -9,13 +9,11 @@ from typing import Any
 import numpy as np
 
 from equimorph.array_types import Float
-from equimorph.arrays import Lanes, Parameters
 from equimorph.dynamics.direct import DirectModel
 from equimorph.dynamics.linkage import Linkage
 from equimorph.dynamics.mechanism import Settings
-from equimorph.dynamics.model import Plant, Points, Row
+from equimorph.dynamics.model import Plant, Points, Row, stable_near
 from equimorph.dynamics.rods import ChainedRod, stiffness_and_rest
-from equimorph.equilibria import settle
 from equimorph.errors import InputError
 from equimorph.optional_packages import load_package
 from equimorph.structures import Rod, State, States
@@ -63,17 +61,6 @@ class CosseratModel(DirectModel):
     def reference(self, states: States) -> Float[np.ndarray, "lanes points space"]:
         """Places at the centres of the elements."""
         return self.chained.places(states)[:, 0]
-
-    def damping_rate(self, damping: float) -> float:
-        """Damping force over mass and velocity, per unit of the structure's time."""
-        return damping * self.unit * self.frequency**2
-
-    def resistance(
-        self, z: Lanes, p: Parameters, mode: Float[np.ndarray, " unknowns"], damping: float
-    ) -> float:
-        """c along the mode."""
-        heavy = float(self.structure.inertia_product(z, p)(mode[None, None])[0, 0] @ mode)
-        return self.damping_rate(damping) * heavy
 
     def plant(self, start: State, step: float, damping: float) -> Plant:
         """The rod at rest at a state."""
@@ -290,12 +277,8 @@ class CosseratPlant(Plant):
 
     def equilibrium(self) -> Points | None:
         """The stable equilibrium of the structure nearby."""
-        structure = self._model.structure
-        found = settle(structure, self.guess()[None], self.p[None])
-        state = State(structure, found.z[0], self.p)
-        if not (found.found[0] and state.index == 0):
-            return None
-        return np.asarray(self._model.reference(state.batch)[0])
+        state = stable_near(self._model.structure, self.guess(), self.p)
+        return None if state is None else np.asarray(self._model.reference(state.batch)[0])
 
     def guess(self) -> Float[np.ndarray, " size"]:
         """Unknowns of the rod, multipliers 0."""

@@ -7,9 +7,8 @@ import numpy as np
 from equimorph.array_types import Float
 from equimorph.arrays import Lanes, Parameters
 from equimorph.dynamics.fold_delay import FoldDelay
-from equimorph.dynamics.model import Course, Model, Motion, Plant, Points, Row
+from equimorph.dynamics.model import Course, Model, Motion, Plant, Points, Row, stable_near
 from equimorph.dynamics.quasistatics import equilibria_along
-from equimorph.equilibria import settle
 from equimorph.structures import State, States, Structure
 
 FIRST_MODE = 5.0
@@ -32,11 +31,16 @@ class DirectModel(Model):
         """Shapes as they are drawn."""
         return self.structure.shape(states.z, states.p)
 
-    @abstractmethod
+    def damping_rate(self, damping: float) -> float:
+        """Rate η ω₁² of C = η ω₁² M, with which ζ₁ = ½ η ω₁; η in units of T."""
+        return damping * self.unit * self.frequency**2
+
     def resistance(
         self, z: Lanes, p: Parameters, mode: Float[np.ndarray, " unknowns"], damping: float
     ) -> float:
         """Damping matrix times a velocity twice; damping in units of T."""
+        heavy = float(self.structure.inertia_product(z, p)(mode[None, None])[0, 0] @ mode)
+        return self.damping_rate(damping) * heavy
 
     def statics(
         self, start: State, motion: Motion, times: Float[np.ndarray, " times"], damping: float
@@ -119,9 +123,8 @@ class DirectPlant(Plant):
 
     def equilibrium(self) -> Points | None:
         """The stable equilibrium of the structure nearby."""
-        found = settle(self.structure, self.guess()[None], self.p[None])
-        state = State(self.structure, found.z[0], self.p)
-        return state.shape() if found.found[0] and state.index == 0 else None
+        state = stable_near(self.structure, self.z, self.p)
+        return None if state is None else state.shape()
 
     def guess(self) -> Float[np.ndarray, " size"]:
         """Unknowns and multipliers."""

@@ -113,21 +113,21 @@ def landing(structure: Structure, z: Float[np.ndarray, " size"], p: Row) -> Stat
     Where Newton's method does not lead there, the gradient flow does.
     """
     n = structure.unknowns
-    z = z.copy()
-    z[n:] = 0.0
-    rest = structure.residual(z[None], p[None])[0, :n]
-    columns = []
-    for k in range(structure.constraints):
-        pulled = z.copy()
-        pulled[n + k] = 1.0
-        columns.append(structure.residual(pulled[None], p[None])[0, :n] - rest)
-    if columns:
-        z[n:] = np.linalg.lstsq(np.array(columns).T, -rest, rcond=None)[0]
+    many = np.ones((1 + structure.constraints, 1))
+    pulled = many * z
+    pulled[:, n:] = np.eye(len(many), len(many) - 1, -1)
+    rest, *others = structure.residual(pulled, many * p)[:, :n]
+    z = pulled[0]
+    if others:
+        z[n:] = np.linalg.lstsq((np.array(others) - rest).T, -rest, rcond=None)[0]
+    return stable_near(structure, z, p) or flow_landing(State(structure, z, p))
+
+
+def stable_near(structure: Structure, z: Float[np.ndarray, " size"], p: Row) -> State | None:
+    """The stable equilibrium to which Newton's method leads; None if there is none."""
     found = settle(structure, z[None], p[None])
     state = State(structure, found.z[0], p)
-    if found.found[0] and state.index == 0:
-        return state
-    return flow_landing(State(structure, z, p))
+    return state if found.found[0] and state.index == 0 else None
 
 
 def flow_landing(state: State) -> State | None:

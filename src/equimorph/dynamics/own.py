@@ -3,7 +3,6 @@
 import numpy as np
 
 from equimorph.array_types import Float
-from equimorph.arrays import Lanes, Parameters
 from equimorph.dynamics.direct import DirectModel, DirectPlant
 from equimorph.dynamics.model import Plant, Row
 from equimorph.dynamics.time_steps import Motion
@@ -17,15 +16,8 @@ class OwnModel(DirectModel):
 
     def plant(self, start: State, step: float, damping: float) -> Plant:
         """The structure at rest at a state."""
-        rate = damping * self.unit * self.frequency**2
+        rate = self.damping_rate(damping)
         return OwnPlant(self.structure, start, step * self.unit, rate)
-
-    def resistance(
-        self, z: Lanes, p: Parameters, mode: Float[np.ndarray, " unknowns"], damping: float
-    ) -> float:
-        """c along the mode."""
-        heavy = float(self.structure.inertia_product(z, p)(mode[None, None])[0, 0] @ mode)
-        return damping * self.unit * self.frequency**2 * heavy
 
 
 class OwnPlant(DirectPlant):

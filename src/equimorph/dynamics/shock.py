@@ -219,7 +219,7 @@ class _Trial:
     def __init__(self, state: State, saddle: State, used: ReplaySettings, modes: int) -> None:
         self.state, self.saddle, self.structure = state, saddle, state.structure
         model = OwnModel(state.structure, state)
-        rate = used.damping * model.unit * model.frequency**2
+        rate = model.damping_rate(used.damping)
         self.clock = Clock(used.step * model.unit, rate, model.unit)
         structure, z, p = self.structure, state.z[None], state.p[None]
         self.mass = structure.inertia(z, p)[0]
