@@ -202,7 +202,7 @@ class LinkagePlant(Simulation):
     def _body_of_node(self) -> dict[int, int]:
         return {body.node: k for k, body in enumerate(self.tree.bodies) if body.node >= 0}
 
-    def entries(self, qpos: Vector, y: Settings) -> Vector:
+    def entries(self, qpos: Float[np.ndarray, " joints"], y: Settings) -> Vector:
         """Entries of the linkage; places of nodes that members carry are theirs."""
         linkage, tree = self.linkage, self.tree
         out = linkage.prescribe(np.zeros(linkage.size), y)

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from equimorph.array_types import Float
 from equimorph.dynamics.mechanism import Mechanism, Settings, Vector
 from equimorph.optional_packages import load_package
 
@@ -39,7 +40,7 @@ class Simulation(ABC):
         """One step in time."""
 
     @abstractmethod
-    def entries(self, qpos: Vector, y: Settings) -> Vector:
+    def entries(self, qpos: Float[np.ndarray, " joints"], y: Settings) -> Vector:
         """Entries of the mechanism; places of nodes that members carry are theirs."""
 
     @property

@@ -118,7 +118,7 @@ class SpatialPlant(Simulation):
         self._mujoco.mj_step2(self.model, data)
         data.qpos[driven], data.qvel[driven] = self._targets, rates
 
-    def entries(self, qpos: Vector, y: Settings) -> Vector:
+    def entries(self, qpos: Float[np.ndarray, " joints"], y: Settings) -> Vector:
         """Entries of the chain: all joints of the simulation."""
         del y
         return qpos.copy()
