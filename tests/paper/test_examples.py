@@ -153,6 +153,17 @@ def test_space_route(numbers_of):
     assert found["round: stable in space all along"] is False
 
 
+def test_space_sideways(numbers_of):
+    """A round rod beside its plane from 1.6015 to 2.4765, at q = 2.1 at (−0.0385, 0.184)."""
+    found = numbers_of("space_sideways")
+    assert found["the arch leaves its plane at q"] == pytest.approx(1.601471549048, abs=2e-11)
+    assert found["it is back in its plane at q"] == pytest.approx(2.476483, abs=5.1e-7)
+    assert found["height of the middle at q = 2.1"] == pytest.approx(-0.0385, abs=5.1e-5)
+    aside = found["distance of the middle from the plane at q = 2.1"]
+    assert aside == pytest.approx(0.184, abs=5.1e-4)
+    assert found["margin at q = 2.1"] > 0.0
+
+
 def test_space_stiffness(numbers_of):
     """Smallest A of the way for three C, and at (0.9, 0) up to two loads; last digit."""
     found = numbers_of("space_stiffness", settings=(2, 2))

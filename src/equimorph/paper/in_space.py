@@ -1,4 +1,4 @@
-"""The article's arch in space: limit loads, the way inside out, how stiff is stiff enough."""
+"""The article's arch in space: limit loads, the way inside out, the branch beside the plane."""
 
 from pathlib import Path
 from typing import NamedTuple
@@ -137,6 +137,61 @@ def space_stiffness(folder: Path, settings: tuple[int, int] = (17, 17)) -> dict[
         em.plotting.save(drawing, folder, "space-stiffness")
     numbers["largest least A of the figure"] = float(least.max())
     return numbers
+
+
+SIDE = 0.01
+"""Force across the plane, by λ_cr, that says to which side the arch swings."""
+BRANCHING = -1e-9
+"""Least margin of states that are not unstable: it is zero, up to round-off, at branch points."""
+SHOWN = (1.65, 1.8, 2.0, 2.2, 2.4)
+"""Loads at which the arch is drawn beside its plane."""
+
+
+def space_sideways(folder: Path) -> dict[str, float]:
+    """Follow the states of a round rod beside its plane, and those in it on both sides."""
+    across = {"side": em.PointForce(0.5, (0.0, 0.0, 1.0))}
+    rod = em.SpatialRod("uniform", torsion=TORSION, lateral=1.0, loads=across)
+    rest, fine = rod.natural_state(Theta=0.9), em.TraceOptions(largest_step=0.05)
+    aside, inverted = (
+        em.lift(rest, [{"side": SIDE}, {"q": load}, {"side": 0.0}]).end.state for load in (2.1, 3.0)
+    )
+    flat = [
+        em.lift(state, {"q": load}, through_folds=True, options=fine)
+        for state, load in ((rest, 3.0), (inverted, 1.0))
+    ]
+    beside = [em.lift(aside, {"q": load}, options=fine) for load in (1.0, 3.0)]
+    y, z = rod.height(0.5), rod.position(0.5)[2]
+    drawing = Figure(figsize=(7.2, 2.5))
+    with em.plotting.house_style():
+        high, wide, seen = drawing.subplots(1, 3, width_ratios=(1.0, 1.0, 0.6))
+        drawing.subplots_adjust(left=0.08, right=0.99, bottom=0.18, top=0.96, wspace=0.38)
+        for paths, colour, sides in ((flat, "#1a1a1a", (1.0,)), (beside, COLOURS[0], (-1.0, 1.0))):
+            for states in (path.states for path in paths):
+                stable = states.margin > BRANCHING
+                for kept, line in ((stable, "-"), (~stable, ":")):
+                    load = np.where(kept, states["q"], np.nan)
+                    high.plot(load, y(states), line, color=colour, linewidth=1.3)
+                    for side in sides:
+                        wide.plot(load, side * z(states), line, color=colour, linewidth=1.3)
+        shapes = [(1.0, rest), *((q, em.lift(aside, {"q": q}).end.state) for q in SHOWN)]
+        for load, state in (*shapes, (3.0, inverted)):
+            shape = state.shape()
+            colour = "#1a1a1a" if load in (1.0, 3.0) else COLOURS[0]
+            seen.plot(shape[:, 2], shape[:, 1], color=colour, linewidth=1.0)
+            if load in SHOWN:
+                seen.annotate(f" {load:g}", shape[len(shape) // 2, [2, 1]], fontsize=6)
+        high.set(xlabel="load q", ylabel="height of the middle")
+        wide.set(xlabel="load q", ylabel="middle beside the plane")
+        seen.set(xlabel="beside the plane", ylabel="height", aspect="equal", xlim=(-0.02, 0.25))
+        em.plotting.save(drawing, folder, "space-sideways")
+    leaves, rejoins = (path.end.state["q"] for path in beside)
+    return {
+        "the arch leaves its plane at q": leaves,
+        "it is back in its plane at q": rejoins,
+        "height of the middle at q = 2.1": float(y(aside)),
+        "distance of the middle from the plane at q = 2.1": float(abs(z(aside))),
+        "margin at q = 2.1": aside.margin,
+    }
 
 
 def least_stiffness(states: em.States, torsion: float) -> float:

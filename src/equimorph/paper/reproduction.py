@@ -23,7 +23,7 @@ INTRODUCTION = (
     "Every figure, table and number of the article, reproduced: theirs, ours, the difference, "
     "and a sentence where they differ."
 )
-WIDE = ("tracking", "inside-out", "parameterisations", "space-route")
+WIDE = ("tracking", "inside-out", "parameterisations", "space-route", "space-sideways")
 """Figures two columns wide."""
 HEAD = ("what", "theirs", "ours", "difference", "")
 
