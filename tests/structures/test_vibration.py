@@ -234,6 +234,36 @@ def test_frequencies_of_a_frame_are_those_of_the_beam_that_it_is():
     np.testing.assert_allclose(found, CANTILEVER[:1] ** 2 * np.sqrt(2.0 / 0.6), rtol=1e-5)
 
 
+def test_frequencies_of_a_frame_in_space_are_those_about_both_axes():
+    """A cantilever of two pieces whose stiffnesses are 2 and 5: ω = β² √(EI/m) each."""
+    joints = {"A": (0, 0, 0), "B": (0.5, 0, 0), "C": (1, 0, 0)}
+    member = em.SpatialMember(("A", "B", "C"), EI=2.0, EI_out=5.0, mass=0.6)
+    frame = em.SpatialFrame(joints, [member], {"A": "fixed"}, {"P": {"C": (0, 0, -1)}}, elements=1)
+    for made in (frame, from_identity(frame.identity())):
+        found = em.natural_state(made).natural_frequencies(4)
+        exact = np.sort(np.outer(CANTILEVER[:2] ** 2, np.sqrt(np.array([2.0, 5.0]) / 0.6)).ravel())
+        np.testing.assert_allclose(found, exact, rtol=2e-8)
+
+
+@pytest.mark.parametrize("axial", [None, 50.0])
+def test_a_swaying_portal_vibrates_in_space_as_in_its_plane(axial):
+    """Very stiff across its plane; at a loaded state, and where members stretch, too. 1e-6."""
+    ends = (("A", "B"), ("B", "C"), ("C", "D"))
+    joints = {"A": (0, 0), "B": (0, 1), "C": (1, 1), "D": (1, 0)}
+    lifted = {name: (x, 0, y) for name, (x, y) in joints.items()}
+    flat = [em.Member(each, EA=axial, mass=1.0) for each in ends]
+    stiff = [em.SpatialMember(each, EI_out=1e3, GJ=1e3, EA=axial, mass=1.0) for each in ends]
+    supports = dict.fromkeys("AD", "fixed")
+    found = []
+    for make, places, members, push in (
+        (em.Frame, joints, flat, (1, 0)), (em.SpatialFrame, lifted, stiff, (1, 0, 0)),
+    ):  # fmt: skip
+        frame = make(places, members, supports, {"H": {"B": push}}, elements=1)
+        state = em.lift(em.natural_state(frame), {"H": 0.5}).end.state
+        found.append(state.natural_frequencies(2))
+    np.testing.assert_allclose(found[1], found[0], rtol=1e-6)
+
+
 def test_portal_with_stretchable_legs_vibrates_as_stiffer_ones_do():
     """Multipliers follow from the turns where members stretch: EA → ∞ is the inextensible limit."""
 

@@ -11,7 +11,6 @@ from equimorph.dynamics.linkage import Bends, Linkage, Supports
 from equimorph.dynamics.mechanism import Vector
 from equimorph.errors import MissingError
 from equimorph.structures import Frame, State, States
-from equimorph.structures.frame.fields import member_masses
 from equimorph.structures.frame.model import FrameModel
 from equimorph.structures.rod.units import FOUR_PI_SQUARED
 
@@ -112,7 +111,7 @@ class ChainedFrame(PlanarChained):
     def __init__(self, frame: Frame, links: int) -> None:
         self.structure, self._frame, self.links = frame, frame, links
         self.length, self.energy = frame.model.length, frame.energy_scale
-        known = member_masses(frame.model)
+        known = frame.model.masses
         if known is None:
             raise MissingError(
                 f"`structure` must have a mass; the frame has none. {frame.massless}"

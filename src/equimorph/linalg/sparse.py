@@ -10,6 +10,9 @@ from equimorph.linalg.dense import Border, BorderedSolution, no_border, solve_bo
 from equimorph.linalg.lanes import over_lanes
 from equimorph.linalg.sparse_kernels import solve_sparse
 
+SWEEPS = 4
+"""Inverse iterations by which the smallest eigenvalue is estimated."""
+
 GROWTH = 1e5
 """Largest growth of diagonal entries, relative to the matrix, of a factorisation that is trusted.
 
@@ -122,6 +125,18 @@ class SparseLayout:
         determinant[~np.isfinite(determinant)] = np.nan
         ratio = 1.0 / np.maximum(growth, 1.0)
         return BorderedSolution(x, negative, ratio, pivoted, determinant)
+
+    def smallest_size(self, values: Float[np.ndarray, "1 entries"]) -> float:
+        """Smallest absolute eigenvalue of a matrix, by inverse iteration; 0 if it is singular."""
+        vector = np.random.default_rng(0).normal(size=(1, 1, self.size))
+        smallest = np.inf
+        for _ in range(SWEEPS):
+            vector = self.solve(values, None, vector / np.linalg.norm(vector)).x
+            length = float(np.linalg.norm(vector))
+            if not np.isfinite(length):
+                return 0.0
+            smallest = 1.0 / length
+        return smallest
 
 
 def _elimination(

@@ -174,12 +174,11 @@ def space_sideways(folder: Path) -> dict[str, float]:
                     for side in sides:
                         wide.plot(load, side * z(states), line, color=colour, linewidth=1.3)
         shapes = [(1.0, rest), *((q, em.lift(aside, {"q": q}).end.state) for q in SHOWN)]
-        for load, state in (*shapes, (3.0, inverted)):
-            shape = state.shape()
-            colour = "#1a1a1a" if load in (1.0, 3.0) else COLOURS[0]
+        for q, state in (*shapes, (3.0, inverted)):
+            shape, colour = state.shape(), COLOURS[0] if q in SHOWN else "#1a1a1a"
             seen.plot(shape[:, 2], shape[:, 1], color=colour, linewidth=1.0)
-            if load in SHOWN:
-                seen.annotate(f" {load:g}", shape[len(shape) // 2, [2, 1]], fontsize=6)
+            if q in SHOWN:
+                seen.annotate(f" {q:g}", shape[len(shape) // 2, [2, 1]], fontsize=6)
         high.set(xlabel="load q", ylabel="height of the middle")
         wide.set(xlabel="load q", ylabel="middle beside the plane")
         seen.set(xlabel="beside the plane", ylabel="height", aspect="equal", xlim=(-0.02, 0.25))

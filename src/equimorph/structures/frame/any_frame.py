@@ -9,9 +9,8 @@ import numpy as np
 from numpy.polynomial import legendre
 
 from equimorph.array_types import Float
-from equimorph.arrays import Lanes, Parameters, Values
+from equimorph.arrays import Lanes, Parameters, Values, Velocity
 from equimorph.errors import InputError
-from equimorph.linalg.sparse import SparseLayout
 from equimorph.model import (
     Actuator,
     ActuatorKind,
@@ -26,6 +25,7 @@ from equimorph.structures.any_network import AnyNetwork
 from equimorph.structures.frame.any_model import AnyFrameModel
 from equimorph.structures.network import direction_of_mechanism
 from equimorph.structures.rod.discretisation import error_by_refinement
+from equimorph.structures.vibration import MaterialPoints
 from equimorph.tolerances import SINGULAR
 
 FINE = 21
@@ -36,8 +36,6 @@ WALKED = 17
 """Places along a piece of a member where it is drawn."""
 SEGMENT = np.linspace(0.0, 1.0, WALKED)
 """Shares of the length of a piece at which it is drawn if an actuator works in it."""
-SWEEPS = 4
-"""Inverse iterations by which the smallest eigenvalue is estimated."""
 NAMED = 6
 """Members that a message names."""
 TURN = 1e-3
@@ -137,7 +135,7 @@ class AnyFrame(AnyNetwork):
         p = np.zeros((1, bare.model.patterns.count))
         z = bare.natural_guess(p)
         entries = bare.parts(z, p)[0]
-        if _is_regular(bare.layout, entries):
+        if bare.layout.smallest_size(entries) > 10.0 * SINGULAR * float(np.abs(entries).max()):
             return
         values, vectors = np.linalg.eigh(bare.layout.dense(entries)[0])
         least = int(np.argmin(np.abs(values)))
@@ -336,6 +334,38 @@ class AnyFrame(AnyNetwork):
             Actuator(kind, lines[:, k]) for kind, some in kinds for k in np.flatnonzero(some)
         )
 
+    # --- in time --------------------------------------------------------------------------------
+
+    @property
+    def massless(self) -> str:
+        """How a frame is given its mass."""
+        return "Give every member one, like mass=0.2."
+
+    def inertia(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes unknowns unknowns"]:
+        """Mass matrix of the members, each as heavy everywhere."""
+        own = self._material
+        return super().inertia(z, p) if own is None else own.inertia(z, p)
+
+    def inertial_force(self, z: Lanes, p: Parameters, velocity: Velocity) -> Velocity:
+        """Forces of inertia of the members at constant rates of the unknowns."""
+        own = self._material
+        if own is None:
+            return super().inertial_force(z, p, velocity)
+        return own.inertial_force(z, p, velocity)
+
+    @property
+    def _material(self) -> MaterialPoints | None:
+        """Masses of the points of the members; None if a mass is not known."""
+        model, space = self.model, self.network.space
+        if model.masses is None:
+            return None
+
+        def places(z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes points space"]:
+            return self.outline(z, p, model.mesh.nodes).reshape(len(z), -1, space)
+
+        heavy = model.masses * model.length**2 / self.energy_scale
+        return MaterialPoints(self, places, np.outer(heavy, model.mesh.weights).ravel())
+
     # --- descriptors ----------------------------------------------------------------------------
 
     @property
@@ -356,18 +386,3 @@ class AnyFrame(AnyNetwork):
             return np.asarray(largest.max(axis=1) / self.model.length)
 
         return self._make(name, "1/length", value, symbol)
-
-
-def _is_regular(layout: SparseLayout, entries: Float[np.ndarray, "1 entries"]) -> bool:
-    """Whether the smallest eigenvalue is far from zero, by inverse iteration."""
-    generator = np.random.default_rng(0)
-    vector = generator.normal(size=(1, 1, layout.size))
-    smallest = np.inf
-    for _ in range(SWEEPS):
-        vector /= np.linalg.norm(vector)
-        vector = layout.solve(entries, None, vector).x
-        size = float(np.linalg.norm(vector))
-        if not np.isfinite(size):
-            return False
-        smallest = 1.0 / size
-    return smallest > 10.0 * SINGULAR * float(np.abs(entries).max())

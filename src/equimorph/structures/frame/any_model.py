@@ -11,6 +11,7 @@ import numpy as np
 from equimorph.argument_kinds import is_listed, is_number, one_of
 from equimorph.array_types import Bool, Float, Int
 from equimorph.errors import InputError
+from equimorph.model.units import STANDARD_GRAVITY
 from equimorph.structures.network import Network, check_parameter_names, vector
 from equimorph.structures.rod.discretisation import Mesh, reference_element
 from equimorph.structures.unit_system import UnitSystem
@@ -62,9 +63,18 @@ class AnyFrameNetwork(Network):
     def bending(self) -> float:
         """Mean bending stiffness of the members: the unit of bending stiffnesses."""
 
+    @property
+    @abstractmethod
+    def lengths(self) -> Float[np.ndarray, " pieces"]:
+        """Lengths of the pieces."""
+
+    def member_of(self, piece: int) -> int:
+        """Member to which a piece belongs."""
+        return piece
+
     def name_of_member(self, piece: int) -> str:
         """Name of the member to which a piece belongs."""
-        return self.edge_names[piece]
+        return str(self.members[self.member_of(piece)].name)
 
     def pieces_of(self, name: str) -> list[tuple[int, float]]:
         """Pieces of a member, each with −1 if it is named from end to start, else 1."""
@@ -320,6 +330,24 @@ class AnyFrameModel(ABC):
     def energy(self) -> float:
         """Unit of energy and of couples."""
         return self.bending / self.length
+
+    @cached_property
+    def masses(self) -> Float[np.ndarray, " pieces"] | None:
+        """Masses of the pieces, in units of force·time²/length; None if one is not known."""
+        made, system, found = self.network, self.system, []
+        owner = np.array([made.member_of(k) for k in range(len(made.lengths))])
+        for m, weight, length in zip(owner.tolist(), made.weights, made.lengths, strict=True):
+            member = made.members[m]
+            what = f"mass of member {member.name}"
+            if member.mass is not None:
+                share = length / made.lengths[owner == m].sum()
+                found.append(share * system.mass(member.mass, what))
+            elif weight > 0.0 and not system.plain:
+                pull = float(weight * length) * system.si("force")
+                found.append(system.mass(pull / STANDARD_GRAVITY, what))
+            else:
+                return None
+        return np.array(found)
 
     @property
     def scalars(self) -> int:

@@ -10,11 +10,9 @@ from equimorph.arrays import Lanes, Parameters
 from equimorph.linalg.dense import multiply
 from equimorph.model import Support
 from equimorph.model.drawing import supports_of_point, unit_vectors
-from equimorph.model.units import STANDARD_GRAVITY
 from equimorph.structures.frame.any_frame import AnyFrame
 from equimorph.structures.frame.mechanics import FrameMechanics
 from equimorph.structures.frame.model import FrameModel
-from equimorph.structures.vibration import MaterialPoints
 
 
 class FrameFields(FrameMechanics, AnyFrame):
@@ -182,29 +180,3 @@ class FrameFields(FrameMechanics, AnyFrame):
         for (start, end), tangent in zip(model.network.ends, tangents, strict=True):
             total += tangent[0] * (start == joint) - tangent[-1] * (end == joint)
         return float(np.arctan2(total[1], total[0]))
-
-
-def member_masses(model: FrameModel) -> Float[np.ndarray, " members"] | None:
-    """Masses of the members, in units of force·time²/length; None if one is not known."""
-    system, found = model.system, []
-    for member, length in zip(model.network.members, model.network.lengths, strict=True):
-        what = f"mass of member {member.name}"
-        if member.mass is not None:
-            found.append(system.mass(member.mass, what))
-        elif member.weight is not None and not system.plain:
-            weight = float(member.weight) * length * system.si("force")
-            found.append(system.mass(weight / STANDARD_GRAVITY, what))
-        else:
-            return None
-    return np.array(found)
-
-
-def frame_material(frame: FrameFields, masses: Float[np.ndarray, " members"]) -> MaterialPoints:
-    """Members that are as heavy everywhere, in units of the frame's energy."""
-    model = frame.model
-
-    def places(z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes points 2"]:
-        return frame.outline(z, p, model.mesh.nodes).reshape(len(z), -1, 2)
-
-    heavy = masses * model.length**2 / frame.energy_scale
-    return MaterialPoints(frame, places, np.outer(heavy, model.mesh.weights).ravel())

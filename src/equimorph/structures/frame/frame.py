@@ -10,14 +10,14 @@ import numpy as np
 from equimorph.argument_checks import check_arguments
 from equimorph.argument_vocabulary import count
 from equimorph.array_types import Bool, Float, Int
-from equimorph.arrays import Lanes, Parameters, Values, Velocity
+from equimorph.arrays import Lanes, Parameters, Values
 from equimorph.errors import InputError
 from equimorph.linalg.dense import multiply
 from equimorph.model import Descriptor, remember_call
 from equimorph.structures.any_network import edges_of_image, images, is_symmetry, parameter_exchange
 from equimorph.structures.contract import Symmetry
 from equimorph.structures.frame.any_model import Actuators, Loads
-from equimorph.structures.frame.fields import FrameFields, frame_material, member_masses
+from equimorph.structures.frame.fields import FrameFields
 from equimorph.structures.frame.mechanics import FrameMechanics
 from equimorph.structures.frame.model import FrameModel
 from equimorph.structures.frame.network import AXES, MemberSpec, SupportSpec, frame_network
@@ -343,24 +343,3 @@ class Frame(DescribedFrame):
 
     def _find_symmetries(self) -> tuple[Symmetry, ...]:
         return symmetries(self)
-
-    # --- in time --------------------------------------------------------------------------------
-
-    @property
-    def massless(self) -> str:
-        """How a frame is given its mass."""
-        return 'Give every member one, like Member(("A", "B"), mass=0.2).'
-
-    def inertia(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes unknowns unknowns"]:
-        """Mass matrix of the members, each as heavy everywhere."""
-        masses = member_masses(self.model)
-        if masses is None:
-            return super().inertia(z, p)
-        return frame_material(self, masses).inertia(z, p)
-
-    def inertial_force(self, z: Lanes, p: Parameters, velocity: Velocity) -> Velocity:
-        """Forces of inertia of the members at constant rates of the unknowns."""
-        masses = member_masses(self.model)
-        if masses is None:
-            return super().inertial_force(z, p, velocity)
-        return frame_material(self, masses).inertial_force(z, p, velocity)

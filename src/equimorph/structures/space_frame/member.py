@@ -87,6 +87,9 @@ class SpatialMember(Edge):
         drawn of a hinge that transmits all but the couple about this axis.
     weight
         Weight per length, for loads on "weight", or a text like "0.1 kg/m"; None: the section's.
+    mass
+        In kg, or as a text; None: that of its weight in a frame with units. Cross-sections have no
+        rotary inertia.
     """
 
     edge: ClassVar[str] = "member"
@@ -108,6 +111,7 @@ class SpatialMember(Edge):
     length: Quantity | None = None
     hinges: Hinges = ()
     weight: Quantity | None = None
+    mass: Quantity | None = None
 
     def __post_init__(self) -> None:
         """Check the hinges, and that nothing is said twice."""

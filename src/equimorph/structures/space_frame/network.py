@@ -94,9 +94,9 @@ class SpatialNetwork(AnyFrameNetwork):
         """Tables of the supports."""
         return [dict(support.data) for support in self.supports]
 
-    def name_of_member(self, piece: int) -> str:
-        """Name of the member to which a piece belongs."""
-        return self.members[int(self.owner[piece])].name
+    def member_of(self, piece: int) -> int:
+        """Member to which a piece belongs."""
+        return int(self.owner[piece])
 
     def pieces_of(self, name: str) -> list[tuple[int, float]]:
         """Pieces of a member, or the one of that name, with −1 where it is named backwards."""
