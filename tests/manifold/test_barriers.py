@@ -73,6 +73,24 @@ def agree(eset, points, seed=0):
     return count
 
 
+def test_barriers_vanish_where_snaps_begin_and_lead_to_the_same_states(plane):
+    """At folds `snap_graph` has the limit of what `barriers` say of states before: 0.1 % of F."""
+    field, graph, count = em.barriers(plane), em.snap_graph(plane, samples=4), 0
+    for snap in graph.snaps:
+        for vertex, one in zip(snap.vertices, snap.landings, strict=True):
+            fold = plane.points[int(vertex)]
+            if one.status != "landed" or abs(fold["F"]) < 1e-3:
+                continue
+            stable = plane.at(x_l=fold["x_l"], F=0.999 * fold["F"]).stable
+            gap = np.abs(stable.z[:, 0] - fold.z[0])
+            near = field.of(stable[[int(gap.argmin())]])[0]
+            assert 0.0 < near.energy < 1e-4
+            assert near.landing.z[0] == pytest.approx(one.state.z[0], abs=1e-3)
+            assert near.released == pytest.approx(one.released, rel=0.01, abs=1e-5)
+            count += 1
+    assert count >= 4
+
+
 def test_a_set_knows_the_barriers_of_single_settings(plane):
     assert agree(plane, 5) >= 5
 
