@@ -33,6 +33,14 @@ PYTHON: dict[str, tuple[Callable[[], object], str]] = {
         lambda: em.Rod(section=STEEL, length="300 mm", span="320 mm"),
         r"`span` must be less than the length of the rod, 300 mm; got '320 mm'",
     ),
+    "a rise that the rod cannot reach": (
+        lambda: em.Rod(section=STEEL, length="300 mm", span="280 mm", rise="200 mm"),
+        r"`span`, `rise` must place end B nearer to A than .* 300 mm; got '280 mm', '200 mm'",
+    ),
+    "a coordinate beyond what it stands for": (
+        lambda: em.Rod(coordinates={"gap": {"nu": 2.0}}).natural_state(gap=0.6),
+        r"`gap` must be a finite number between -0.5 and 0.5 L",
+    ),
     "millimetres for shares of the length": (
         lambda: em.Rod(span=320),
         r"`span` must lie between 0 and 1.*the rod has length 1",

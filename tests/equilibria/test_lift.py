@@ -216,7 +216,7 @@ def test_arch_can_be_lifted_back_from_its_curvature_bound(arch):
     ("to", "message"),
     [
         ({"theta": 1.0}, r"`theta` must be a parameter \(Theta, Delta, q, nu\); got 'theta'"),
-        ({"nu": 1.0}, r"`nu` must be a finite number between 0 and 1 \(both excluded\); got 1\.0"),
+        ({"nu": 1.0}, r"`nu` must be a finite number between 0 and 1 L .* got 1\.0"),
         ({"nu": 0.0}, r"`nu` must be a finite number between 0 and 1"),
         ({"q": float("nan")}, r"`q` must be a finite number; got nan"),
         ([{"q": 1.0}, {"Theta": float("inf")}], r"`Theta` must be a finite number; got inf"),

@@ -1,23 +1,20 @@
 """Figures fit at any size and with long names: nothing leaves them, tick labels stay apart."""
 
 from dataclasses import replace
-from itertools import product
 
 import numpy as np
 import pytest
-from matplotlib.transforms import Bbox
 from PIL import Image
 
 import equimorph as em
 from equimorph import plotting
 from equimorph.plotting import style
 from equimorph.plotting.style import label_boxes, touching, whole_figure
+from fits import SIZES, check_fit
 from typecheck import unchecked
 
 LOAD = "force_that_pushes_the_crown_of_the_arch_down"
 MOVE = "shortening_of_the_left_bar_by_its_actuator"
-SIZES = (0.6, 1.0, 1.8)
-"""Widths and heights relative to what a figure has by itself."""
 
 
 @pytest.fixture(scope="module")
@@ -61,26 +58,6 @@ def test_figures_with_long_names_fit_at_all_sizes(name, truss_set, way):
         for size in SIZES:
             figure.set_size_inches(size * width, size * height)
             check_fit(figure)
-
-
-def check_fit(figure):
-    """Legends, labels and titles lie inside what is saved; tick labels do not touch."""
-    whole = whole_figure(figure) or Bbox.from_bounds(0.0, 0.0, *figure.get_size_inches())
-    pixels = whole.transformed(figure.dpi_scale_trans).padded(1.6)  # borders of letters
-    legends = [*figure.legends, *(ax.get_legend() for ax in figure.axes if ax.get_legend())]
-    boxes = [each.get_window_extent() for each in legends]
-    boxes += [box for ax in figure.axes for axis in (ax.xaxis, ax.yaxis)
-              for box in label_boxes(axis)]  # fmt: skip
-    boxes += [ax.yaxis.label.get_window_extent() for ax in figure.axes if ax.axison]
-    for box in boxes:
-        assert all(pixels.contains(*corner) for corner in (box.min, box.max))
-    for ax in figure.axes:
-        if ax.name == "3d":
-            pairs = product(label_boxes(ax.xaxis), label_boxes(ax.yaxis))
-            assert not any(Bbox.intersection(*pair) for pair in pairs)
-        else:
-            assert not touching(ax.xaxis)
-            assert not touching(ax.yaxis)
 
 
 def test_a_legend_that_is_too_wide_is_saved_whole(tmp_path):

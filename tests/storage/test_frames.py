@@ -23,6 +23,19 @@ def test_a_set_is_a_frame_of_its_vertices(spring_set: EquilibriumSet):
     np.testing.assert_allclose(np.cos(on_folds.angle) ** 3, on_folds.x_l, rtol=1e-9)
 
 
+def test_states_and_paths_are_frames():
+    """The fold of the spring at x_l = cos³δ."""
+    rest = em.Spring().natural_state(x_l=0.8)
+    path = em.lift(rest, {"F": 1.0})
+    frame = path.frame()
+    assert list(frame) == ["x_l", "F", "k", "at", "length", "index", "energy", "angle"]
+    assert frame.attrs["units"]["energy"] == em.Spring().descriptor("energy").unit
+    assert np.cos(frame["angle"].iloc[-1]) ** 3 == pytest.approx(0.8, rel=1e-9)
+    found = em.find_equilibria(rest.structure, {"x_l": 0.8, "F": 0.0}).frame()
+    assert list(found) == ["x_l", "F", "k", "index", "energy", "angle"]
+    assert sorted(found["index"]) == [0, 0, 1]
+
+
 def test_a_route_is_a_frame_of_its_steps(spring_route: Route):
     frame, schedule = spring_route.frame(), spring_route.schedule
     np.testing.assert_array_equal(frame["x_l"], schedule.values[:, 0])

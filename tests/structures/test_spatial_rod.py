@@ -381,7 +381,7 @@ def test_a_study_file_describes_the_same_rod():
         ({"lateral": 0.0}, "`lateral` must be positive everywhere; got 0"),
         ({"loads": {"M": em.Couple(0.5)}}, "`loads.M` must have a potential; got a couple"),
         ({"loads": {"p": em.Pressure()}}, "`loads.p` must have a potential; got pressure"),
-        ({"span": 1.2}, "must place end B nearer to A than the length of the rod"),
+        ({"span": 1.2}, "`span` must be less than the length of the rod, 1; got 1.2"),
         ({"span": 0.8, "rise": 0.5, "sideways": 0.5}, "must place end B nearer to A"),
         ({"ends": ("pinned", "pinned")}, "`ends` must hold the rotation of one end at least"),
         ({"ends": (em.SpatialEnd(x="free"), em.SpatialEnd(x="free"))}, "must hold x at one end"),

@@ -24,6 +24,7 @@ from equimorph.equilibria.trace_options import EventCode, EventKind, TraceOption
 from equimorph.errors import InputError
 from equimorph.model import Constraint, Descriptor, Progress
 from equimorph.structures import State, States
+from equimorph.tables import Table, Tabular
 
 JOINED = 1e-8
 """Distance in the metric within which a leg ends where the next one begins."""
@@ -56,7 +57,7 @@ class Event:
 
 
 @dataclass(frozen=True)
-class Path:
+class Path(Tabular):
     """A lifted curve: exact states in order, what happened on the way, and how it ended.
 
     Parameters
@@ -84,6 +85,11 @@ class Path:
         """Number of states and how the lift ended."""
         end = self.end.state
         return f"Path({len(self.states)} states; {self.end.kind} at {end})"
+
+    @property
+    def table(self) -> Table:
+        """All states with ``at``, ``length`` and ``index``, as of `States`; see `frame`."""
+        return self.states.table_with({"at": self.at, "length": self.length, "index": self.index})
 
     @property
     def end(self) -> Event:

@@ -54,9 +54,10 @@ class Parameter:
     def _limits(self) -> str:
         if np.isinf(self.lower) and np.isinf(self.upper):
             return ""
+        unit = "" if self.unit == "1" else f" {self.unit}"
         if np.isinf(self.upper):
-            return f" greater than {self.lower:g}"
-        return f" between {self.lower:g} and {self.upper:g} (both excluded)"
+            return f" greater than {self.lower:g}{unit}"
+        return f" between {self.lower:g} and {self.upper:g}{unit} (both excluded)"
 
 
 def names_of(parameters: Sequence[Parameter]) -> tuple[str, ...]:

@@ -1,6 +1,6 @@
 """Equilibrium states: a single one, and batches of them."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property
@@ -12,11 +12,11 @@ from equimorph.argument_checks import check_arguments
 from equimorph.array_types import Float, Int
 from equimorph.arrays import Flags, Lanes, Parameters, Values
 from equimorph.errors import InputError, MissingError
-from equimorph.model import Drawing, names_of, position
+from equimorph.model import Descriptor, Drawing, names_of, position
 from equimorph.structures.contract import Structure
 from equimorph.structures.margin import stability_margin
 from equimorph.structures.vibration import vibrations
-from equimorph.tables import heading, html_table, units_of
+from equimorph.tables import Column, Table, Tabular, heading, html_table, units_of
 
 SHOWN = 20
 """Number of states that notebooks show."""
@@ -35,7 +35,7 @@ class SpaceStability(StrEnum):
 
 
 @dataclass(frozen=True, eq=False)
-class States:
+class States(Tabular):
     """A batch of equilibrium states of one structure, one per lane."""
 
     structure: Structure
@@ -84,6 +84,18 @@ class States:
         more = f", the first {SHOWN}" if len(self) > SHOWN else ""
         rows = [[k, *row] for k, row in enumerate(zip(*columns, strict=True))]
         return html_table(f"{self!r}{more}", ["", *head], rows)
+
+    @property
+    def table(self) -> Table:
+        """Parameters, index, energy, and the descriptor that tells states apart; see `frame`."""
+        return self.table_with({"index": self.index})
+
+    def table_with(self, known: Mapping[str, Column], more: Iterable[Descriptor] = ()) -> Table:
+        """Parameters, known columns, energy, what tells states apart and further descriptors."""
+        shown = [self.structure.descriptor("energy"), self.structure.elevation, *more]
+        measured = {each.name: each(self) for each in shown}
+        units = units_of((*self.structure.parameters, *shown))
+        return Table({**self.parameters, **known, **measured}, units)
 
     @property
     def parameters(self) -> dict[str, Values]:

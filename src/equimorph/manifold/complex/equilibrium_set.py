@@ -144,11 +144,7 @@ class EquilibriumSet(Tabular):
         """
         kinds = np.array([kind.name.lower() for kind in VertexKind])[self.kinds]
         bounded = (each.descriptor for each in self.constraints)
-        shown = [self.structure.descriptor("energy"), self.structure.elevation, *bounded]
-        measured = {each.name: each for each in shown}
-        columns = {**self.points.parameters, "kind": kinds, "index": self.index}
-        columns |= {name: each(self.points) for name, each in measured.items()}
-        return Table(columns, units_of((*self.structure.parameters, *shown)))
+        return self.points.table_with({"kind": kinds, "index": self.index}, bounded)
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -81,20 +81,10 @@ class PlanarDescription(RodDescription):
                     f"{self.profiles['axial']!r}: pressure on a stretching axis is not modelled."
                 )
 
-    def check_span(self, span: Any, length: Any) -> None:
-        """Refuse a span that an inextensible rod cannot reach, as its user wrote it."""
-        reach = self.units.value("length")
-        held = any(axis.name == "nu" and axis.opposed for axis in support_axes(self.supports))
-        stretches = self.profiles["axial"] is not None
-        if span is None or not held or stretches or -reach < self.places["nu"] < reach:
-            return
-        unit = (
-            "" if isinstance(length, str) or self.units.plain else f" {self.units.label('length')}"
-        )
-        raise InputError(
-            f"`span` must be less than the length of the rod, {length or 1}{unit}; got {span!r}. "
-            "A rod with `axial` stiffness may be stretched."
-        )
+    @property
+    def opposed(self) -> set[str]:
+        """Places of end B along axes that both supports hold."""
+        return {axis.name for axis in support_axes(self.supports) if axis.opposed}
 
     def place_parameter(self, raw: str) -> Parameter:
         """Angle of an end, span, rise, or the distance of an inclined line."""

@@ -213,7 +213,7 @@ class Rod(Described):
                 ends, profiles, {**own, **(loads or {})}, actuators or {}, coordinates, places,
                 kinks, self.units, breaks,
             )  # fmt: skip
-            self._general.check_span(span, length)
+            self._general.check_reach({"span": span, "rise": rise}, length)
             self.parameters = self._general.parameters
             made = self._general.in_own_parameters(self._raw.model)
             self._use_mechanics(GeneralMechanics(made))

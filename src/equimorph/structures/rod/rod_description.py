@@ -73,6 +73,35 @@ class RodDescription(ABC):
     def place_parameter(self, raw: str) -> Parameter:
         """Parameter of an angle of an end, or of the place of end B."""
 
+    @property
+    @abstractmethod
+    def opposed(self) -> set[str]:
+        """Places of end B along axes that both supports hold."""
+
+    def check_reach(self, given: Mapping[str, Any], length: Any) -> None:
+        """Refuse places of end B that an inextensible rod cannot reach.
+
+        Parameters
+        ----------
+        given
+            Span and rises as the user wrote them, by the names of the arguments, or None.
+        length
+            Of the rod, as the user wrote it.
+        """
+        places = {name: float(self.places[name]) for name in self.places if name in self.opposed}
+        far = np.linalg.norm(list(places.values()))
+        if self.profiles["axial"] is not None or far < self.units.value("length"):
+            return
+        unit = "" if self.units.plain else f" {self.units.label('length')}"
+        told = {"span" if name == "nu" else name: x for name, x in places.items() if x != 0.0}
+        got = [f"{x:g}{unit}" if given[k] is None else repr(given[k]) for k, x in told.items()]
+        limit = "be less than" if len(told) == 1 else "place end B nearer to A than"
+        reach = length if isinstance(length, str) else f"{length or 1}{unit}"
+        raise InputError(
+            f"{', '.join(f'`{k}`' for k in told)} must {limit} the length of the rod, {reach}; got "
+            f"{', '.join(got)}. A rod with `axial` stiffness may be stretched."
+        )
+
     # --- terms and profiles ---------------------------------------------------------------------
 
     @cached_property
@@ -167,7 +196,10 @@ class RodDescription(ABC):
                 f"`coordinates.{name}` must combine parameters of one unit; got "
                 f"{', '.join(sorted(quantities))}."
             )
-        role: Role = "load" if next(iter(weights)) in self.loads else "actuator"
+        (raw, weight), *others = weights.items()
+        role: Role = "load" if raw in self.loads else "actuator"
+        if not others and weight and sum(raw in each for each in self.combined.values()) == 1:
+            return _renamed(self._parameter(raw), name, role, weight)
         quantity, units = quantities.pop(), self.units
         # between held ends a straight rod needs a turn to know its upright side
         needed = self.coordinates is None and name == "Theta" and "nu" in self.raw_names
@@ -235,6 +267,14 @@ class RodDescription(ABC):
         if self.coordinates is not None:
             data["coordinates"] = self.combined
         return data | self.units.data()
+
+
+def _renamed(raw: Parameter, name: str, role: Role, weight: float) -> Parameter:
+    """The parameter of another name that `weight` times a raw one moves alone."""
+    default = None if raw.default is None else raw.default / weight
+    low, high = sorted((raw.lower / weight, raw.upper / weight))
+    period = raw.period / abs(weight)
+    return Parameter(name, raw.unit, raw.scale, role, default, low, high, period)
 
 
 def rescale(shape: LoadShape, unit: float) -> LoadShape:

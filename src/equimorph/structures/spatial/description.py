@@ -116,26 +116,20 @@ class SpatialDescription(RodDescription):
             return PinnedMechanics(with_phase_condition(own))
         return SpatialMechanics(own) if obstacle(own) else OrbitMechanics(own)
 
-    def check_places(self) -> None:
-        """Refuse places of end B that an inextensible rod cannot reach."""
-        held = {axis.name for axis in support_axes(self.supports) if axis.opposed}
+    @property
+    def opposed(self) -> set[str]:
+        """Places of end B along axes that both supports hold."""
+        return {axis.name for axis in support_axes(self.supports) if axis.opposed}
+
+    def check_places(self, given: Mapping[str, Any], length: Any) -> None:
+        """Refuse places that an inextensible rod cannot reach, or that break orbits."""
         for name in ("rise", "sideways"):
             if self.phase and self.places[name] != 0.0:
                 raise InputError(
                     "`phase` must be False unless every state may be turned about the x axis for "
                     f"nothing; got {name} = {self.places[name]:g}."
                 )
-        if self.profiles["axial"] is not None:
-            return
-        length, unit = self.units.value("length"), self.units.label("length")
-        place = np.array([self.places[name] if name in held else 0.0 for name in PLACES])
-        if not np.linalg.norm(place) < length:
-            written = ", ".join(f"{value:g}" for value in place)
-            raise InputError(
-                f"`span`, `rise`, `sideways` must place end B nearer to A than the length of the "
-                f"rod, {length:g} {unit}; got ({written}). A rod with `axial` stiffness may be "
-                "stretched."
-            )
+        self.check_reach(given, length)
 
     def place_parameter(self, raw: str) -> Parameter:
         """Angle of an end, or place of end B."""

@@ -189,7 +189,7 @@ class SpatialRod(DescribedInSpace):
             self.units,
             phase=phase,
         )
-        self.description.check_places()
+        self.description.check_places(lengths, length)
         self.parameters = self.description.parameters
         self._use_mechanics(self.description.mechanics(self._raw.model))
 
