@@ -77,6 +77,7 @@ def test_figures_of_a_study_with_long_names_fit_at_all_sizes(name, tmp_path, mon
     for film in ("film", "replay_film"):
         monkeypatch.setattr(plotting, film, lambda _, path, **__: path.touch())
     empty_pages(monkeypatch)
+    monkeypatch.setattr("equimorph.study.question.convert", lambda _, path: path.touch())
     monkeypatch.setattr("equimorph.study.html.pictures", lambda *_: "")
     study = tmp_path / f"{name}.toml"
     study.write_text(text)
