@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
-from equimorph.array_types import Bool
+from equimorph.array_types import Bool, Float
 from equimorph.arrays import Lanes, Parameters, Points
 from equimorph.charts.location import Found
 from equimorph.charts.quiet_paths import QuietPaths, Unloaded
@@ -20,7 +20,8 @@ from equimorph.charts.rules import (
     lowest,
     nearest,
 )
-from equimorph.equilibria import TraceOptions
+from equimorph.charts.score_changes import shares_of_ends
+from equimorph.equilibria import ParameterLine, TraceOptions
 from equimorph.equilibria.first_stable import OFF, STABLE, FirstStable
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
@@ -139,7 +140,20 @@ class _OnPath(Rule):
             score = np.where(near, distance, np.inf)
             return first_of_each(found, score, eset.structure.elevation)
 
-        return Choice(choose, changes=ends.changes if isinstance(ends, QuietPaths) else None)
+        quiet = QuietPaths(eset, start)
+
+        def changes(p: Parameters, toward: Parameters) -> Float[np.ndarray, "items k"]:
+            """Where quiet paths change, and where the states at the ends of other paths end."""
+            shares = quiet.changes(p, toward)
+            if isinstance(ends, QuietPaths):
+                return shares
+            z, ended = over(p[:, setting.free]), np.full(len(p), np.nan)
+            some = np.flatnonzero(np.isfinite(z[:, 0]))
+            line = ParameterLine(eset.structure, p[some], toward[some])
+            ended[some] = shares_of_ends(line, z[some], eset.constraints)[0]
+            return np.column_stack([ended, shares])
+
+        return Choice(choose, changes=changes)
 
 
 def _first(eset: EquilibriumSet, start: Unloaded, bound: float) -> Ends:

@@ -44,8 +44,9 @@ DIFFERENT = 1e-4
 BESIDE, MOVED = 0.02, 0.3
 """Distance from a fold, in lengths of edges, at which the preference is examined, and the largest
 distance of its state there: at a cusp it is the cube root of the first."""
-PARTS, ROUNDS, LOCATED = 3, 24, 3.0**-16
-"""Parts and rounds of the division of edges, and the share of an edge, 2e-8, to which the change is
+PARTS, BATCH, ROUNDS, LOCATED = (3, 64), 800, 24, 3.0**-16
+"""Fewest and most parts into which an edge is divided in a round, and states that are examined in
+one: few take nearly as long as many. Rounds, and the share of an edge, 2e-8, to which the change is
 located."""
 GUESSES = 4
 """Every so many rounds edges are divided on both sides of places that the rule knows."""
@@ -274,22 +275,24 @@ def _locate_changes(
         wide = todo[high[todo] - low[todo] > LOCATED]
         if len(wide) == 0:
             break
-        cuts = low[wide, None] + (high - low)[wide, None] * np.arange(PARTS + 1) / PARTS
+        guessed = number % GUESSES == 0
+        parts = PARTS[0] if guessed else int(np.clip(BATCH // len(wide), *PARTS))
+        cuts = low[wide, None] + (high - low)[wide, None] * np.arange(parts + 1) / parts
         exact: ItemValues = np.full(len(wide), np.nan)
-        if number % GUESSES == 0:
+        if guessed:
             span = cuts[:, [0, -1]]
             exact = _enclose(cuts, way.changes(preference, wide, span, first[wide]))
-        at, lanes = cuts[:, 1:-1], np.repeat(wide, PARTS - 1)
+        at, lanes = cuts[:, 1:-1], np.repeat(wide, parts - 1)
         z, p, good = way.states(lanes, at.ravel())
         same: ItemFlags = np.zeros(len(lanes), bool)
         same[good] = preference.prefers(z[good], p[good]) == first[lanes[good]]
         good, same = good.reshape(at.shape), np.reshape(same, at.shape)
-        passed = np.where(same.all(axis=1), PARTS - 1, same.argmin(axis=1))
+        passed = np.where(same.all(axis=1), parts - 1, same.argmin(axis=1))
         every: Items = np.arange(len(wide))
         low[wide], high[wide] = cuts[every, passed], cuts[every, passed + 1]
         sure = (passed == 1) & np.isfinite(exact)
         low[wide[sure]] = high[wide[sure]] = exact[sure]
-        unknown = ~good[every, np.minimum(passed, PARTS - 2)]
+        unknown = ~good[every, np.minimum(passed, parts - 2)]
         todo = np.setdiff1d(todo, wide[unknown])
     done = np.zeros(len(way.ends), bool)
     z, p, good = way.states(todo, 0.5 * (low + high)[todo])
@@ -301,7 +304,8 @@ def _locate_changes(
 def _enclose(cuts: Float[np.ndarray, "n cuts"], shares: Float[np.ndarray, "n k"]) -> ItemValues:
     """Put the inner cuts of edges on both sides of the first known share inside; the shares."""
     shares = np.column_stack([shares, np.full(len(cuts), np.nan)])
-    shares[~((shares > cuts[:, :1]) & (shares < cuts[:, -1:]))] = np.nan
+    low, high = cuts[:, :1] + LOCATED, cuts[:, -1:] - LOCATED
+    shares[~((shares > low) & (shares < high))] = np.nan
     share = shares[np.arange(len(cuts)), np.isfinite(shares).argmax(axis=1)]
     gap = np.abs(np.column_stack([shares, cuts[:, [0, -1]]]) - share[:, None])
     room = np.minimum(ASIDE, APART * np.where(gap > LOCATED, gap, np.inf).min(axis=1))

@@ -10,7 +10,7 @@ from equimorph.charts.location import Found
 from equimorph.charts.rules import Scoring
 from equimorph.columns import Columns
 from equimorph.equilibria import ParameterLine, TraceOptions
-from equimorph.equilibria.trace import trace
+from equimorph.equilibria.trace import Traces, trace
 from equimorph.equilibria.trace_options import EventCode
 from equimorph.manifold.lookup.exact_states import exact_states
 from equimorph.model import Constraint
@@ -85,9 +85,7 @@ def changes_by_score(
     own, rival = found.states[count:][lane], found.states[best]
     velocity = stop.p[lane] - own.p
     line = ParameterLine(structure, own.p.copy(), velocity)
-    ended = trace(line, rival.z.copy(), constraints, TraceOptions(record=False))
-    over = np.isin(ended.code, ENDS)
-    out[lane[over], 1] = ended.t[over]
+    out[lane, 1], ended = shares_of_ends(line, rival.z.copy(), constraints)
     ways = _Ways(
         own.p,
         velocity,
@@ -97,6 +95,24 @@ def changes_by_score(
     there = np.flatnonzero(ended.code == EventCode.ARRIVED)
     out[lane[there], 0] = _ties(structure, score, ways.take(there))
     return out
+
+
+def shares_of_ends(
+    ways: ParameterLine, z: Lanes, constraints: tuple[Constraint, ...]
+) -> tuple[Values, Traces]:
+    """Shares of ways at which states on them end, and how they do; not numbers where they do not.
+
+    Parameters
+    ----------
+    ways
+        The ways.
+    z
+        States at their starts.
+    constraints
+        What ends states, beside folds and branch points.
+    """
+    ended = trace(ways, z, constraints, TraceOptions(record=False))
+    return np.where(np.isin(ended.code, ENDS), ended.t, np.nan), ended
 
 
 def _ties(structure: Structure, score: Scoring, ways: _Ways) -> Values:
