@@ -103,3 +103,16 @@ def bench_curves_with_unknown_parameters(benchmark):
     goal = {left: left(starts) + 0.01, right: right(starts) + 0.01, "Theta": None, "Delta": None}
     found = benchmark.pedantic(em.lift, (starts, goal), rounds=3)
     record(benchmark, starts, found.kind)
+
+
+def bench_equilibria_of_a_rod_in_space(benchmark):
+    """20 000 states of the default rod in space, lifted from one to random angles and loads."""
+    rod = em.SpatialRod(torsion=0.77, lateral=1.0)
+    one = em.lift(rod.natural_state(Theta=0.9), {"q": 1.0}).end.state
+    count, generator = 20_000, np.random.default_rng(1)
+    states = em.States(rod, one.z[None].repeat(count, axis=0), one.p[None].repeat(count, axis=0))
+    to = {"Theta": generator.uniform(0.8, 1.0, count), "q": generator.uniform(0.5, 1.4, count)}
+    em.lift(states[:64], {"q": 1.1})
+    found = benchmark.pedantic(em.lift, (states, to), rounds=3)
+    record(benchmark, states, found.kind)
+    assert set(found.kind.tolist()) == {"arrived"}

@@ -3,6 +3,7 @@
 import os
 import sys
 from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -149,6 +150,23 @@ def test_calls_are_refused_where_the_plain_check_refuses_them():
         assert _refused(remembering, *call) == wrong
         refused[int(wrong)] += 1
     assert refused.min() > 20
+
+
+def test_checks_in_several_threads_keep_their_calls_apart():
+    """Every call has a shape of its own, so that each is checked; threads change often."""
+
+    @checked
+    def twice(row: Row) -> Row:
+        return 2.0 * row
+
+    before = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    try:
+        with ThreadPoolExecutor(4) as pool:
+            found = list(pool.map(lambda n: twice(np.full(n, float(n))), range(1, 401)))
+    finally:
+        sys.setswitchinterval(before)
+    assert [len(each) for each in found] == list(range(1, 401))
 
 
 def test_modules_are_checked_as_they_are_imported(tmp_path: Path, monkeypatch):

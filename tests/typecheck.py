@@ -16,6 +16,7 @@ from importlib.abc import MetaPathFinder
 from importlib.machinery import ModuleSpec, PathFinder
 from inspect import isclass
 from itertools import islice
+from threading import local
 from types import FunctionType, MappingProxyType, ModuleType
 from typing import Any
 
@@ -123,32 +124,40 @@ class _Memory:
         return result
 
 
+class _Pending(local):
+    """Calls that a thread is about to make, the last first; paths are followed in several."""
+
+    def __init__(self) -> None:
+        self.calls: list[Callable[..., Any]] = []
+
+
 class _Known:
     """Check of a function's annotations, and which forms of arguments with which results passed."""
 
     def __init__(self, function: FunctionType) -> None:
         self.passed: dict[Hashable, set[Hashable]] = {}
         self._function = function
-        self._next: list[Callable[..., Any]] = []
+        self._own = _Pending()
 
     @cached_property
     def _checked(self) -> Callable[..., Any]:
         @wraps(self._function)
         def call(*args: Any, **kwargs: Any) -> Any:
             __tracebackhide__ = True
-            return self._next.pop()(*args, **kwargs)
+            return self._own.calls.pop()(*args, **kwargs)
 
         return jaxtyped(check(call), typechecker=None)
 
     def check(self, call: Callable[..., Any], args: Any, kwargs: Any) -> Any:
         """Call something with the function's annotations; raise if these are not obeyed."""
         __tracebackhide__ = True
-        before = len(self._next)
-        self._next.append(call)
+        calls = self._own.calls
+        before = len(calls)
+        calls.append(call)
         try:
             return self._checked(*args, **kwargs)
         finally:
-            del self._next[before:]  # arguments that do not pass leave the call undone
+            del calls[before:]  # arguments that do not pass leave the call undone
 
 
 def _known(function: FunctionType) -> _Known:

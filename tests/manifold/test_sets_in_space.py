@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import equimorph as em
+from equimorph.manifold import VertexKind
 from equimorph.study import run_study
 
 LATERAL, REJOINED = 1.601471549048, 2.476483
@@ -59,6 +60,45 @@ def test_a_twisted_clamped_rod_that_is_pushed_together_has_its_folds_where_lifts
                 assert abs(sides[0] - sides[1]) == 2
                 met.append(name)
     assert {"twist_B", "nu"} == set(met)
+
+
+def test_a_round_rod_has_its_looping_folds_in_the_set_over_twist_and_span():
+    """Pinned on its orbits: each fold of the set is where a lift throws a loop, to 2e-8.
+
+    Beyond 0.434966 (`tests/structures/test_orbits.py`), at a twist of 9, only loops are stable:
+    every state is there twice, turned by half a turn.
+    """
+    rod = em.SpatialRod(torsion=0.75, lateral=1.0, loads={}, span=0.95, phase=True)
+    box, within = em.Box(twist_B=(8.5, 9.5), nu=(0.38, 0.5)), [rod.max_curvature <= 14.0]
+    eset = em.equilibrium_set(rod, box, within=within, intervals=(2, 2), checks=0)
+    assert eset.audit.clean
+    folds = eset.points[eset.kinds == VertexKind.FOLD]
+    start = em.lift(rod.natural_state(twist_B=9.0), {"nu": 0.6}).end.state
+    for twist, span in set(zip(folds["twist_B"].round(12), folds["nu"].round(8), strict=True)):
+        there = em.lift(start, [{"twist_B": float(twist)}, {"nu": 0.3}]).end
+        assert there.kind == "fold"
+        assert there.state["nu"] == pytest.approx(float(span), abs=2e-8)
+    for span, count in ((0.43, 2), (0.44, 6)):
+        states = eset.at(twist_B=9.0, nu=span)
+        assert len(states) == count
+        np.testing.assert_allclose(states.energy[::2], states.energy[1::2], rtol=1e-9)
+
+
+def test_a_set_over_angle_load_and_side_force_holds_what_lifts_reach():
+    """Three free parameters; the stable states near the plane, by a lift each, to 1e-9."""
+    across = {"side": em.PointForce(0.5, (0.0, 0.0, 1.0))}
+    rod = em.SpatialRod("uniform", torsion=0.77, lateral=1.0, loads=across)
+    box = em.Box(Theta=(0.85, 0.95), q=(1.2, 2.0), side=(0.01, 0.03))
+    within = [rod.max_curvature <= 7.0]
+    eset = em.equilibrium_set(rod, box, within=within, intervals=(2, 2, 2), checks=0)
+    assert eset.audit.clean
+    for theta, load, side in ((0.9, 1.7, 0.02), (0.87, 1.3, 0.015), (0.93, 1.9, 0.026)):
+        rest = rod.natural_state(Theta=theta)
+        lifted = em.lift(rest, [{"side": side}, {"q": load}]).end.state
+        states = eset.at(Theta=theta, q=load, side=side).stable
+        apart = np.abs(aside(rod, states) - float(aside(rod, lifted)))
+        assert apart.min() < 1e-9
+        assert states.energy[apart.argmin()] == pytest.approx(lifted.energy, abs=1e-9)
 
 
 def test_a_study_of_a_rod_in_space_has_its_route_figures_film_and_files(tmp_path):

@@ -153,6 +153,7 @@ def test_space_route(numbers_of):
     assert found["round: stable in space all along"] is False
 
 
+@pytest.mark.slow
 def test_space_sideways(numbers_of):
     """A round rod beside its plane from 1.6015 to 2.4765, at q = 2.1 at (−0.0385, 0.184)."""
     found = numbers_of("space_sideways")

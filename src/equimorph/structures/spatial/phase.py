@@ -148,15 +148,10 @@ def _same(a: np.ndarray, b: np.ndarray) -> bool:
 class PinnedMechanics(SpatialMechanics):
     """Mechanics of a rod on whose orbits the phase condition picks one state, and that opposite."""
 
-    def orbit_direction(self, z: Lanes) -> Float[np.ndarray, "lanes unknowns"]:
-        """ξ = ∂q/∂α at α = 0, of the unknown quaternions."""
-        q = z[:, : self.unknowns].reshape(len(z), self.unknowns // 4, 4)
-        axis = np.array([0.0, 0.5, 0.0, 0.0])
-        return np.asarray((product(axis, q) - product(q, axis)).reshape(len(z), self.unknowns))
-
     def on_axis(self, z: Lanes) -> Flags:
-        """Whether states are those that the turn leaves as they are."""
-        square = np.einsum("li,i->l", self.orbit_direction(z) ** 2, self.mass)
+        """Whether states are those that the turn leaves as they are: ξ = (0, 0, −q₃, q₂)."""
+        across = slice(2, self.unknowns, 4), slice(3, self.unknowns, 4)
+        square = sum(z[:, each] ** 2 @ self.mass[each] for each in across)
         return np.asarray(square < ON_AXIS**2)
 
     def equations(self, z: Lanes, p: Parameters, *directions: Direction) -> Jet:
