@@ -1,10 +1,14 @@
 """Designs whose numbers docs/design.md gives: an arch turned over with less torque, and columns.
 
-Run it: python benchmarks/design.py [arch|columns]
+Run it: python benchmarks/design.py [arch|columns|shapes]; shapes draws docs/design.png.
 """
 
 import sys
 import time
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import numpy as np
 
 import equimorph as em
 
@@ -72,7 +76,85 @@ def columns() -> None:
         tell(found, found.loads, f"{time.process_time() - began:.1f} s of CPU")
 
 
+PLACES = (0.25, 0.5, 0.75)
+SETTINGS = (
+    ({"Theta": 0.2, "Delta": 0.0}, 1.0, (0.0966, 0.1426, 0.0756)),
+    ({"Theta": 0.2, "Delta": 0.0}, -1.0, (-0.0078, -0.1072, -0.0603)),
+    ({"Theta": 0.0, "Delta": 0.2}, -1.0, (0.0044, -0.0940, -0.0984)),
+)
+"""Motors, side of the middle, and heights to be held at the places (units of L)."""
+
+
+def strip(k: list[float], b: list[float]) -> em.Rod:
+    """Strip between clamps, with intrinsic curvature k and stiffness b at five places."""
+    curvature, stiffness = (
+        [[s, float(each)] for s, each in zip(S, values, strict=True)] for values in (k, b)
+    )
+    return em.Rod(loads={}, span=0.95, stiffness=stiffness, curvature=curvature)
+
+
+def states(rod: em.Rod) -> list[em.State]:
+    """The three states, each out of all equilibria on a line through its setting."""
+    found = []
+    for at, side, _ in SETTINGS:
+        line = em.equilibrium_set(rod, em.Box(Theta=(-0.4, 0.4)), fixed={"Delta": at["Delta"]})
+        stable, rise = line.at(Theta=at["Theta"]).stable, rod.height(0.5)
+        found.append(max(stable, key=lambda each: side * rise(each)))
+    return found
+
+
+def gap(rod: em.Rod, heights: tuple[float, ...]) -> em.Descriptor:
+    """Largest distance from the given heights."""
+    each = [
+        abs(em.function_of(f"gap at {s}", lambda y, to=to: y - to, rod.height(s)))
+        for s, to in zip(PLACES, heights, strict=True)
+    ]
+    return em.largest_of("gap", *each)
+
+
+def shapes() -> None:
+    """Three shapes held by one strip: worst distance of nine heights."""
+    began = time.process_time()
+    first = strip([0.0] * 5, [1.0] * 5)
+    before = states(first)
+    asked = [
+        em.StateValue(state, em.peak(gap(first, heights)))
+        for state, (_, _, heights) in zip(before, SETTINGS, strict=True)
+    ]
+    total = em.DesignBound(lambda k, b: float(np.trapezoid(b, S)) + 0.0 * k[0], 1.0, 1.0)
+    wide = {"k": ([-3.0] * 5, [3.0] * 5, [0.0] * 5), "b": ([0.4] * 5, [2.5] * 5, [1.0] * 5)}
+    found = em.design(strip, wide, asked, [total], tolerance=1e-8)
+    after = states(found.structure)
+    held = [
+        float(gap(found.structure, heights)(state))
+        for state, (_, _, heights) in zip(after, SETTINGS, strict=True)
+    ]
+    tell(found, found.variables, f"{time.process_time() - began:.0f} s of CPU")
+    tell("rebuilt:", held, "margins", [each.margin for each in after])
+    draw(before, after)
+
+
+def draw(before: list[em.State], after: list[em.State]) -> None:
+    """Shapes of both strips, and the heights that were asked for."""
+    titles = ("Θ = 0.2, upright", "Θ = 0.2, inverted", "Δ = 0.2")
+    whole, axes = plt.subplots(1, 3, figsize=(9.0, 1.9), sharey=True, layout="constrained")
+    for ax, title, one, other, (_, _, heights) in zip(
+        axes, titles, before, after, SETTINGS, strict=True
+    ):
+        for state, style, label in ((one, "0.65", "uniform"), (other, "C0", "designed")):
+            line = state.structure.shape(state.z[None], state.p[None])[0]
+            ax.plot(*line.T, color=style, label=label)
+        x = [float(other.structure.position(s)[0](other)) for s in PLACES]
+        ax.plot(x, heights, "ko", markersize=5, fillstyle="none", label="asked for")
+        ax.set(title=title, xlabel="x / L", aspect="equal")
+    axes[0].set_ylabel("y / L")
+    whole.legend(
+        *axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False
+    )
+    whole.savefig(Path(__file__).parents[1] / "docs" / "design.png", dpi=160)
+
+
 if __name__ == "__main__":
     wanted = sys.argv[1:] or ["arch", "columns"]
     for name in wanted:
-        {"arch": arches, "columns": columns}[name]()
+        {"arch": arches, "columns": columns, "shapes": shapes}[name]()
