@@ -87,7 +87,7 @@ def main(name="truss", number=1000, share=1.0):
     goal, *_, start = sorted(eset.at(**place).stable, key=eset.structure.elevation)
     field = em.barriers(eset)
     margin = em.Descriptor("margin", "1", lambda z, p, s=eset.structure: em.States(s, z, p).margin)
-    objectives = {"barrier": field.descriptor, "margin": margin, "length": None}
+    objectives = {"barrier": field.descriptor, "margin": margin, "length": "length"}
     routes = {kind: em.plan(eset, start, goal, objective=each) for kind, each in objectives.items()}
     known = {kind: field.of(route.states).energy for kind, route in routes.items()}
     least = {kind: float(np.nanmin(values)) for kind, values in known.items()}

@@ -76,16 +76,6 @@ class EnclosedArea:
         chorded = -s * multiply(s, self.matrix.T) - c * multiply(c, self.matrix.T)
         return np.asarray(chorded + self.mesh.weights * (y * c - x * s))
 
-    def hessian(self, theta: Nodal) -> Float[np.ndarray, "lanes nodes nodes"]:
-        """∂²V/∂θᵢ∂θⱼ: ``Wᵢⱼ sin(θⱼ − θᵢ) + (∂d/∂θᵢ)ᵀ Q ∂d/∂θⱼ`` off the diagonal."""
-        s, c = np.sin(theta), np.cos(theta)
-        out = self.matrix * (c[:, :, None] * s[:, None, :] - s[:, :, None] * c[:, None, :])
-        slope = self.mesh.weights * np.stack([-s, c], axis=1)
-        out += np.einsum("lan,ab,lbm->lnm", slope, self.closing, slope)
-        at = np.arange(theta.shape[1])
-        out[:, at, at] = self.curvature(theta)
-        return np.asarray(out)
-
     def curvature(self, theta: Nodal) -> Nodal:
         """∂²V/∂θᵢ²."""
         s, c = np.sin(theta), np.cos(theta)
