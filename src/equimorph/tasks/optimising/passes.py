@@ -85,15 +85,14 @@ def passes_near(
     start, found = project_onto_set(programme.setting, start.z, start.p, start.rows)
     if not found[0]:
         return []
+    first = Iterate.at(programme, start)
     if like is None:
-        possible = _possible(Iterate.at(programme, start).expansion, AROUND * reach)
-        lanes = list(islice(possible, MOST))
+        lanes = list(islice(_possible(first.expansion, AROUND * reach), MOST))
     else:
         lanes = [_Active(*(tuple(each.tolist()) for each in like.binding))]
-    here, ended = start.take(np.zeros(len(lanes), int)), list[CriticalPoint]()
+    at, ended = first.take(np.zeros(len(lanes), int)), list[CriticalPoint]()
     last = np.full(len(lanes), np.inf)
     for _ in range(ITERATIONS):
-        at = Iterate.at(programme, here)
         newton = [each.newton(at.expansion, k) for k, each in enumerate(lanes)]
         steps = {k: each for k, each in enumerate(newton) if each is not None}
         size = {k: float(np.linalg.norm(each.step)) for k, each in steps.items()}
@@ -113,6 +112,7 @@ def passes_near(
         last = last[near]
         if not lanes:
             break
+        at = Iterate.at(programme, here)
     passes = [each for each in ended if like is not None or _holds(programme, each)]
     return sorted(passes, key=lambda each: float(_distances(programme, each.point, start)[0]))
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from equimorph.array_types import Float, Int
-from equimorph.arrays import Frames, ItemFlags
+from equimorph.arrays import Frames, ItemFlags, Items
 from equimorph.manifold.geometry.setting import Setting, embed
 from equimorph.manifold.queries.nearest import SetPoints
 from equimorph.structures import States
@@ -97,11 +97,15 @@ class Iterate:
         frames, points = tangents_at(programme.setting, points)
         return cls(points, frames, programme.expand(points, frames))
 
+    def take(self, lanes: Items) -> "Iterate":
+        """Some of the lanes."""
+        expansion = Expansion(*(column[lanes] for column in vars(self.expansion).values()))
+        return Iterate(self.points.take(lanes), self.frames[lanes], expansion)
+
     def minimum(self, k: int, answer: QuadraticStep, converged: bool) -> CriticalPoint:
         """Lane `k` as a point from which no step is made."""
-        expansion = Expansion(*(column[k : k + 1] for column in vars(self.expansion).values()))
-        points = self.points.take(np.array([k]))
-        return CriticalPoint(points, self.frames[k : k + 1], expansion, answer, converged)
+        one = self.take(np.array([k]))
+        return CriticalPoint(one.points, one.frames, one.expansion, answer, converged)
 
 
 @dataclass
