@@ -38,7 +38,7 @@ def way(truss_set):
 
 
 FIGURES = {
-    "surface": lambda eset, _: plotting.surface(eset, eset.structure.displacement("B", "y")),
+    "surface": lambda eset, _: plotting.surface(eset),
     "parameter_plane": plotting.parameter_plane,
     "solutions": lambda eset, route: plotting.solutions(eset, eset.points[:1]),
     "margins": lambda _, route: plotting.margins(route),

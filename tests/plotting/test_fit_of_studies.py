@@ -42,19 +42,19 @@ ROD_NAMES = {
 }
 COARSE = {"[93, 160]": "[6, 10]", "[46, 80]": "[6, 10]"}
 STUDIES = {
-    "tasks": ({'kind = "spring"\n': SPRING}, SPRING_NAMES),
-    "maps": (COARSE, ROD_NAMES),
-    "motion": ({}, ROD_NAMES),
-    "calibration": ({}, {}),
+    "tasks": ({'kind = "spring"\n': SPRING}, SPRING_NAMES, 40),
+    "maps": (COARSE, ROD_NAMES, 2),
+    "motion": ({}, ROD_NAMES, 5),
+    "calibration": ({}, {}, 1),
 }
-"""Examples, what is replaced in them, and longer names."""
+"""Examples, what is replaced in them, longer names, and how many figures there are at least."""
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", STUDIES)
 def test_figures_of_a_study_with_long_names_fit_at_all_sizes(name, tmp_path, monkeypatch):
     text = (EXAMPLES / f"{name}.toml").read_text(encoding="utf-8")
-    replaced, names = STUDIES[name]
+    replaced, names, fewest = STUDIES[name]
     for old, new in replaced.items():
         assert old in text
         text = text.replace(old, new, 1)
@@ -84,7 +84,5 @@ def test_figures_of_a_study_with_long_names_fit_at_all_sizes(name, tmp_path, mon
     if name == "calibration":
         (tmp_path / "calibration.csv").write_bytes((EXAMPLES / "calibration.csv").read_bytes())
     with unchecked():
-        outcome = run_study(study, tmp_path / "out")
-    refused = [each.question.kind.refusal(each.question, each.answer) for each in outcome.answers]
-    assert not any(refused)
-    assert len(drawn) >= len(outcome.answers)
+        run_study(study, tmp_path / "out")
+    assert len(drawn) >= fewest

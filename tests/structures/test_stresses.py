@@ -110,6 +110,14 @@ def test_efforts_have_symbols_and_units(strip):
                     ("F(x_l)", "force"), ("−δ(F)", "length")]  # fmt: skip
 
 
+def test_a_bound_of_stress_bounds_a_set_as_one_of_curvature_does(strip):
+    """A proposal is in the user's units: 20/L."""
+    for bound in (strip.max_stress <= 600.0, strip.max_strain <= 0.01, strip.max_curvature <= 0.1,
+                  strip.safety_factor("900 MPa") >= 1.5):  # fmt: skip
+        assert strip.missing_bound([bound]) == ""
+    assert strip.missing_bound([strip.max_stress >= 1.0]) == "max_curvature <= 0.0625"
+
+
 # --- in space -------------------------------------------------------------------------------------
 
 WIRE = em.Round("2 mm", E="70 GPa", nu=0.33)

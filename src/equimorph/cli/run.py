@@ -11,6 +11,7 @@ from equimorph.manifold import EquilibriumSet
 from equimorph.model import Descriptor, Workers
 from equimorph.structures import States
 from equimorph.study import Outcome, read_problem, run_study, summary
+from equimorph.tables import heading
 
 COMPILED = "kernels that are compiled are kept; the study had not begun"
 """What is kept of a run that is interrupted while kernels are compiled."""
@@ -77,9 +78,11 @@ def _set_line(eset: EquilibriumSet, *, reused: bool) -> str:
 
 def _table(heights: Descriptor, states: States) -> Table:
     table = Table(box=None, header_style="bold")
-    for title in (heights.name, "index", "margin", "energy"):
-        table.add_column(title, justify="right")
+    energy = states.structure.descriptor("energy").unit
+    heads = (heading(heights.name, heights.unit), "index", "margin", heading("energy", energy))
+    for head in heads:
+        table.add_column(head, justify="right")
     values = zip(heights(states), states.index, states.margin, states.energy, strict=True)
-    for height, index, margin, energy in values:
-        table.add_row(f"{height:.5f}", str(index), f"{margin:.4f}", f"{energy:.5f}")
+    for height, index, margin, held in values:
+        table.add_row(f"{height:.5f}", str(index), f"{margin:.4f}", f"{held:.5f}")
     return table

@@ -85,7 +85,7 @@ _HIDDEN_ROUTE: dict[str, Any] = {
 @check_arguments
 def surface(
     eset: EquilibriumSet,
-    height_descriptor: Descriptor,
+    height_descriptor: Descriptor | None = None,
     ax: Axes | None = None,
     route: Route | Tracking | None = None,
     *,
@@ -101,7 +101,7 @@ def surface(
     eset
         Equilibrium set over two free parameters.
     height_descriptor
-        Third axis; a height or an angle that distinguishes the sheets.
+        Third axis, which tells the sheets apart; None takes the structure's own.
     ax
         Three-dimensional axes to draw on; None makes a figure one and a half columns wide.
     route
@@ -129,16 +129,16 @@ def surface(
             division = divided_by(eset, limit)
             eset, beyond = division.eset, division.side > 0
             bounds = [line for line, _ in limit_pieces(division)]
-        heights = np.asarray(height_descriptor(eset.points))
-        points = np.column_stack([eset.coordinates, heights])
-        _frame(ax, eset, height_descriptor, points)
+        height = eset.structure.elevation if height_descriptor is None else height_descriptor
+        points = np.column_stack([eset.coordinates, np.asarray(height(eset.points))])
+        _frame(ax, eset, height, points)
         curves, legend = _curves(eset, points)
         if limit is not None:
             curves += [Curve(points[line], _LIMIT | {"path_effects": _RIM}) for line in bounds]
             legend.append(Line2D([], [], **_LIMIT, label=constraint_label([limit])))
         if route is not None and route.path is not None:
             states = states_along(route.path, _ROUTE_POINTS)
-            places = np.column_stack([track(eset, states), height_descriptor(states)])
+            places = np.column_stack([track(eset, states), height(states)])
             curves.append(Curve(places, _ROUTE, _HIDDEN_ROUTE, slack=_ROUTE_SLACK))
             legend.append(_route_entry(route.status, route.path))
             _draw_ends(ax, places)

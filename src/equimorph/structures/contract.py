@@ -6,7 +6,7 @@ Those that Newton's method needs are in `structures.equations`.
 import json
 import re
 from abc import abstractmethod
-from collections.abc import Callable, Hashable, Mapping
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, ClassVar, Self
@@ -89,8 +89,6 @@ class Structure(Rebuilt, Equations):
     parameters: tuple[Parameter, ...]
     length_unit: str = "1"
     """Unit of the coordinates to draw."""
-    endless_in: ClassVar[str] = ""
-    """Descriptor to bound, as infinitely many equilibria exist where it grows; empty if none."""
     upward: ClassVar[str] = "y"
     """Axis, y or z, that is upward in pictures of a structure in space."""
     energy_scale: float = 1.0
@@ -369,6 +367,11 @@ class Structure(Rebuilt, Equations):
     def is_discretised(self) -> bool:
         """Whether a finer discretisation resolves more; elsewhere `resolved` only bounds states."""
         return type(self).error_estimate is not Structure.error_estimate
+
+    def missing_bound(self, within: Sequence[Constraint]) -> str:
+        """Bound to add where there are equilibria without end within others; empty if none."""
+        del within
+        return ""
 
     @property
     def watched(self) -> tuple[Descriptor, ...]:

@@ -97,11 +97,10 @@ def _intervals(wanted: Any) -> tuple[int, ...]:
 def _bounds(structure: Structure, texts: Sequence[str]) -> tuple[Constraint, ...]:
     """Constraints of the set; structures with equilibria without end need a bound."""
     constraints = constraints_of(structure, texts, "set.within")
-    bounded = {each.descriptor.name for each in constraints if each.sense == "<="}
-    needed = structure.endless_in
-    if needed and needed not in bounded:
+    if missing := structure.missing_bound(constraints):
+        told = ", ".join(texts) or "nothing"
         raise InputError(
-            f"`set.within` must bound the {needed} of this structure, which has equilibria without "
-            f'end; got {", ".join(texts) or "nothing"}. Add "{needed} <= 20".'
+            f"`set.within` must bound the {missing.split()[0]} of this structure, which has "
+            f'equilibria without end; got {told}. Add "{missing}".'
         )
     return constraints

@@ -1,7 +1,7 @@
 """What rods in the plane and in space have in common, in the user's units."""
 
 from abc import abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from typing import Any, ClassVar
 
@@ -14,7 +14,7 @@ from equimorph.arrays import Flags, Lanes, Parameters, Sides, Values
 from equimorph.errors import InputError
 from equimorph.linalg import BorderedSolution
 from equimorph.linalg.intervals import Interval
-from equimorph.model import Descriptor, remember_call
+from equimorph.model import Constraint, Descriptor, remember_call
 from equimorph.structures.approach import smooth_arcs
 from equimorph.structures.contract import Readers, Symmetry, Written
 from equimorph.structures.equations import (
@@ -39,6 +39,11 @@ from equimorph.structures.unit_system import Units as SystemSpec
 
 ARCS = 128
 """Number of cubic arcs along a rod: their error is below 1e-10 for κ = 10."""
+ENDLESS = 20.0
+"""Curvature, times the length, that is proposed as the bound of a set."""
+BOUNDING = {*((f"max_{name}", "<=") for name in ("curvature", "strain", "stress")),
+            ("safety_factor", ">=")}  # fmt: skip
+"""Descriptors and senses of constraints that bound the curvature of a rod."""
 TOUCHING = 1e-9
 """Distance, as a share of the length, at which a rod without a thickness touches itself."""
 COORDINATES = ("x", "height", "z")
@@ -88,7 +93,6 @@ class AnyRod(HeavyRod):
     descriptors are in the user's units.
     """
 
-    endless_in: ClassVar[str] = "max_curvature"
     written: ClassVar[Written] = {
         "max_curvature": "max_curvature",
         "energy": "total_energy",
@@ -363,6 +367,12 @@ class AnyRod(HeavyRod):
 
         name, label = f"clearance({apart:.9g})", self.units.label("length")
         return Descriptor(name, label, value, "clearance", self.signature, place)
+
+    def missing_bound(self, within: Sequence[Constraint]) -> str:
+        """Rods wind up without end unless their curvature, strain or stress is bounded."""
+        given = {(each.descriptor.name.partition("(")[0], each.sense) for each in within}
+        largest = ENDLESS * self.units.value("curvature")
+        return "" if given & BOUNDING else f"max_curvature <= {largest:g}"
 
     def warn_of_contact(self, state: State, thickness: float) -> tuple[str, ...]:
         """One line where a rod of some thickness touches itself in a state."""
