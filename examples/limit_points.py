@@ -42,7 +42,8 @@ def main() -> dict[str, list[em.Path]]:
 
 def follow(truss: em.Truss) -> list[em.Path]:
     """Three lifts, each through a fold back to the load at which it began."""
-    state, paths = truss.natural_state(), []
+    state = truss.natural_state()
+    paths: list[em.Path] = []
     for load in (0.02, -0.02, 0.02):
         options = em.TraceOptions(largest_step=0.02)
         paths.append(em.lift(state, {"F": load}, through_folds=True, options=options))
@@ -63,7 +64,7 @@ def figure(result: dict[str, list[em.Path]]) -> Axes:
         ax = Figure(figsize=(3.4, 2.6), layout="constrained").subplots()
         ax.axhline(0.0, color="#d5d5d5", linewidth=0.8)
         for joint, paths in result.items():
-            move = paths[0].states.structure.displacement(joint, "y")
+            move = paths[0].states.structure.descriptor(f"displacement({joint},y)")
             load = np.concatenate([each.states["F"] for each in paths])
             down = np.concatenate([-move(each.states) for each in paths])
             ax.plot(down, load, color=colours[joint], label=labels[joint])
