@@ -18,6 +18,9 @@ from equimorph.manifold.queries.levels import Level, level_set, part
 from equimorph.model import Descriptor
 from equimorph.structures import States
 
+EQUAL = 1e-11
+"""Part of the largest barrier that is added to differences: where symmetry makes energies equal all
+along a curve, their round-off is no change of order."""
 TIED = 1e-8
 """Difference of energies, relative to the largest barrier, that is none."""
 APART = 1e-3
@@ -117,7 +120,7 @@ def _gap(field: SetBarriers, over: StatesOver, index: int, z: Lanes, p: Paramete
     size, sign = np.full(len(z), field.ceiling), np.ones(len(z))
     np.minimum.at(size, lane, np.abs(gap))
     np.multiply.at(sign, lane, np.where(gap > 0.0, -1.0, 1.0))
-    return np.asarray(sign * size)
+    return np.asarray(sign * size + EQUAL * field.ceiling)
 
 
 def _lowest(field: SetBarriers, saddles: States) -> Flags:
