@@ -18,7 +18,7 @@ from equimorph.manifold.queries.levels import Level, level_set, part
 from equimorph.model import Descriptor
 from equimorph.structures import States
 
-EQUAL = 1e-11
+EQUAL = 2e-12
 """Part of the largest barrier that is added to differences: where symmetry makes energies equal all
 along a curve, their round-off is no change of order."""
 TIED = 1e-8
