@@ -17,7 +17,7 @@ def assert_equal(one, other):
         np.testing.assert_array_equal(one.p, other.p)
     elif isinstance(one, em.Structure):
         assert one.signature == other.signature
-    elif isinstance(one, em.Descriptor | str | None):
+    elif isinstance(one, em.Descriptor | str | type | None):
         assert one == other
     else:
         parts, others = _parts(one), _parts(other)

@@ -67,5 +67,5 @@ def test_lees_frame_snaps_where_it_folds():
 
 def test_a_frame_without_mass_is_refused():
     frame = em.Frame({"A": (0, 0), "B": (1, 0)}, [("A", "B")], {"A": "fixed"}, {"P": {"B": (0, 1)}})
-    with pytest.raises(em.errors.InputError, match="Member"):
+    with pytest.raises(em.errors.InputError, match="every member"):
         replay({"P": 1.0}, frame.natural_state(), rate=0.1)

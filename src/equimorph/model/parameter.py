@@ -54,7 +54,8 @@ class Parameter:
     def _limits(self) -> str:
         if np.isinf(self.lower) and np.isinf(self.upper):
             return ""
-        unit = "" if self.unit == "1" else f" {self.unit}"
+        bounds = {self.lower, self.upper} - {-np.inf, np.inf}
+        unit = "" if self.unit == "1" or bounds == {0.0} else f" {self.unit}"
         if np.isinf(self.upper):
             return f" greater than {self.lower:g}{unit}"
         return f" between {self.lower:g} and {self.upper:g}{unit} (both excluded)"
