@@ -16,7 +16,7 @@ from equimorph.dynamics.outcomes import Clock, Launches, Outcome, play
 from equimorph.dynamics.own import OwnModel
 from equimorph.structures.vibration import vibrations
 
-MODES, DAMPING, STEP, TOGETHER = 6, 0.05, 0.04, 100
+MODES, DAMPING, STEP, TOGETHER = 6, 0.05, 0.04, 200
 
 
 def knock(field, states, energy, number, generator):
@@ -24,18 +24,19 @@ def knock(field, states, energy, number, generator):
     structure, way = states.structure, np.linspace(0.0, 1.0, len(states))
     place = np.searchsorted(way, generator.uniform(0.0, 1.0, number))
     model = OwnModel(structure, states[0])
-    clock = Clock(STEP * model.unit, DAMPING * model.unit * model.frequency**2, model.unit)
     barriers = field.of(states).energy / structure.energy_scale
     level = structure.energy(states.z, states.p) + barriers
     count = min(MODES, structure.unknowns - structure.constraints)
-    modes = vibrations(structure, states.z, states.p, count).modes
+    free = vibrations(structure, states.z, states.p, count)
+    rate = DAMPING * model.unit * model.frequency**2
+    clock = Clock.resolving(free.frequencies.ravel(), STEP * model.unit, rate, model.unit)
     left = undecided = 0
     for first in range(0, number, TOGETHER):
         own = place[first : first + TOGETHER]
         aim = generator.normal(size=(len(own), count))
         aim *= np.sqrt(2.0 * energy / (aim**2).sum(axis=1))[:, None]
         able = np.flatnonzero(energy > barriers[own])
-        velocity = np.einsum("lk,lku->lu", aim, modes[own])[able]
+        velocity = np.einsum("lk,lku->lu", aim, free.modes[own])[able]
         own = own[able]
         if len(own) == 0:
             continue
@@ -56,8 +57,9 @@ def arch():
 
 def strip():
     """The strip without loads, ν = 0.95."""
-    box = em.Box(Theta=(-1, 1), Delta=(-1, 1))
-    eset = em.equilibrium_set(em.Rod(span=0.95), box, fixed={"q": 0.0}, intervals=(13, 13))
+    rod = em.Rod(span=0.95)
+    box, within = em.Box(Theta=(-1, 1), Delta=(-1, 1)), [rod.max_curvature <= 12]
+    eset = em.equilibrium_set(rod, box, fixed={"q": 0.0}, within=within, intervals=(13, 13))
     return eset, {"Theta": 0.2, "Delta": 0.1}
 
 

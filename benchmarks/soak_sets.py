@@ -7,10 +7,10 @@ determined by its number; those in the file are not lifted again, so that a run 
 goes on. A summary follows; ``python benchmarks/soak_sets.py summary FILES`` adds up the lines of
 several runs, and repeats those that are not clean.
 
-Specimens are those of the tests of the contract: rods, frames, trusses, chains, springs. Boxes,
-grids, values of the other parameters and constraints are random; symmetric values, zero, are as
-frequent as others. Half of the boxes are most of the range of their parameters, and half of the
-chains may wind as far as they like.
+Specimens are those of the tests of the contract, with elements as they are by default: rods,
+frames, trusses, chains, springs. Boxes, grids, values of the other parameters and constraints are
+random; symmetric values, zero, are as frequent as others. Half of the boxes are most of the range
+of their parameters, and half of the chains may wind as far as they like.
 """
 
 import sys
@@ -29,8 +29,9 @@ from equimorph.errors import InputError  # noqa: E402  # after the path of the s
 from equimorph.manifold import equilibrium_set  # noqa: E402
 from equimorph.model import Box, Constraint, Descriptor, Silent  # noqa: E402
 from equimorph.structures import Truss  # noqa: E402
-from oracles.specimens import LINKS, SPECIMENS, Specimen  # noqa: E402
+from oracles.specimens import LINKS, Specimen, specimens  # noqa: E402
 
+SPECIMENS = specimens(fine=True)
 COLUMNS = 7
 """Of a line."""
 LONGEST = 60.0
@@ -41,6 +42,7 @@ RANGES = {
     "Theta": (0.2, 2.0),
     "Delta": (-0.6, 0.6),
     "nu": (0.65, 0.9),
+    "reach": (0.3, 0.48),
     "rod q": (-6.0, 9.0),
     "x_l": (0.6, 1.3),
     "spring F": (-0.3, 0.3),

@@ -53,7 +53,7 @@ def figure(result: np.ndarray) -> Axes:
         above, below = Figure(figsize=(3.4, 3.2), layout="constrained").subplots(2, sharex=True)
         above.step(steps, result[:, 0], label="load", where="post")
         above.plot(steps, result[:, 1], ".", label="estimated")
-        above.set_ylabel("load, λ_cr")
+        above.set_ylabel(r"load, $\lambda_\mathrm{cr}$")
         above.legend(frameon=False)
         below.plot(steps, result[:, 2])
         below.set(xlabel="step", ylabel="height of the crown, L")

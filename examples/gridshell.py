@@ -9,8 +9,6 @@ stands, and bears its own weight.
 Run it: python examples/gridshell.py; it writes gridshell.png and gridshell.gif.
 """
 
-from pathlib import Path as FilePath
-
 import numpy as np
 from matplotlib.figure import Figure
 
@@ -87,5 +85,5 @@ def report(path: em.Path) -> str:
 if __name__ == "__main__":
     result = main()
     print(report(result))
-    figure(result).savefig(FilePath("gridshell.png"), dpi=150)
+    em.plotting.save(figure(result), ".", "gridshell", ["png"])
     em.plotting.film(result, "gridshell.gif")

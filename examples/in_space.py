@@ -63,9 +63,9 @@ def main() -> Result:
 
 def figure(result: Result) -> Figure:
     """Draw the lowest eigenvalue out of the plane along the way for three strips."""
-    drawing = Figure(figsize=(3.5, 2.5))
+    drawing = Figure(figsize=(3.5, 2.5), layout="constrained")
     with em.plotting.house_style():
-        ax = drawing.add_axes((0.15, 0.17, 0.82, 0.8))
+        ax = drawing.subplots(squeeze=False)[0, 0]
         share = result.way.length / result.way.length[-1]
         for ratio, colour in ((1.0, "#d1004b"), (result.least, "#e8902a"), (2.0, "#1f5f99")):
             label = f"{ratio:.3g} : 1"

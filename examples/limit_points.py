@@ -61,7 +61,7 @@ def figure(result: dict[str, list[em.Path]]) -> Axes:
     labels = {"B": "pressed directly", "D": "by way of a bar"}
     colours = {"B": "#1d5a91", "D": "#a1561a"}
     with em.plotting.house_style():
-        ax = Figure(figsize=(3.4, 2.6), layout="constrained").subplots()
+        ax = Figure(figsize=(3.4, 2.6), layout="constrained").subplots(squeeze=False)[0, 0]
         ax.axhline(0.0, color="#d5d5d5", linewidth=0.8)
         for joint, paths in result.items():
             move = paths[0].states.structure.descriptor(f"displacement({joint},y)")

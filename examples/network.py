@@ -61,7 +61,7 @@ def main(intervals: tuple[int, int] = (11, 11)) -> Result:
 def figure(result: Result) -> Figure:
     """Both states without load."""
     drawing = Figure(figsize=(5.0, 3.0), layout="constrained")
-    axes = drawing.subplots()
+    axes = drawing.subplots(squeeze=False)[0, 0]
     for state in (network().natural_state(), result.inverted):
         axes.plot(*state.shape().T)
     axes.set(aspect="equal", xlabel="x", ylabel="y", title="stable without load")

@@ -50,5 +50,5 @@ def figure(result: tuple[float, em.Path]) -> Figure:
 
 if __name__ == "__main__":
     found = main()
-    figure(found).savefig("round_arch.png", dpi=150)
+    em.plotting.save(figure(found), ".", "round_arch", ["png"])
     print(f"leaves its plane at q = {found[0]:.9f}")

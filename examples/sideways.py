@@ -60,5 +60,5 @@ def report(result: Result) -> str:
 if __name__ == "__main__":
     found = main()
     print(report(found))
-    figure(found).savefig("sideways.png", dpi=200)
+    em.plotting.save(figure(found), ".", "sideways", ["png"])
     em.plotting.film(found.path, FilePath("sideways.gif"))

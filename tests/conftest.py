@@ -55,8 +55,14 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         items[:] = kept
 
 
+COARSE = 80
+"""Dots per inch of figures that tests save: what they show is the same, and drawn sooner."""
+
+
 def pytest_collection_finish() -> None:
     """What lives as long as the tests need not be looked through again and again for garbage."""
+    if style := sys.modules.get("equimorph.plotting.style"):
+        style.RESOLUTION = COARSE
     gc.collect()
     gc.freeze()
 

@@ -298,6 +298,35 @@ def test_every_public_function_is_checked():
     assert [each.__name__ for each in functions if not is_checked(each)] == []
 
 
+def test_a_name_that_is_no_argument_is_refused_with_those_that_are(things):
+    """Every public function, constructor and method, and the nearest name if one is close."""
+    calls = 0
+    for label, function in public_functions(things):
+        parameters = inspect.signature(function).parameters
+        if any(each.kind is inspect.Parameter.VAR_KEYWORD for each in parameters.values()):
+            continue
+        known = ", ".join(name for name, each in parameters.items() if each.kind not in VARIABLE)
+        with unchecked(), pytest.raises(InputError, match=r"; got qqq\.$") as refused:
+            function(qqq=1)
+        said, calls = str(refused.value), calls + 1
+        assert "\n" not in said, label
+        assert f"must have arguments among {known or 'none'}; got" in said, label
+    assert calls > 150
+
+
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (lambda: em.Member(("A", "B"), curvatur=1.0), r"got curvatur. Did you mean curvature\?$"),
+        (em.limit_load, r"`limit_load` must have the argument state; got n"),
+        (lambda: em.Spring(1.0, 2.0, 3.0, 4.0), r"among .*; got 4 without names\.$"),
+    ],
+)
+def test_calls_with_too_few_or_too_many_values_are_refused(call, said):
+    with unchecked(), pytest.raises(InputError, match=said):
+        call()
+
+
 def test_the_schedule_of_a_refused_route_is_named():
     with unchecked(), pytest.raises(InputError, match="A refused route has no schedule") as refused:
         em.verify(None)

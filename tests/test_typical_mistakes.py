@@ -59,6 +59,10 @@ PYTHON: dict[str, tuple[Callable[[], object], str]] = {
         lambda: arch().natural_state(theta=0.9),
         r"`theta` must be a parameter \(Theta, Delta.*Did you mean Theta\?",
     ),
+    "a misspelt argument": (
+        lambda: em.Rod(lods={"F": em.PointForce(0.5)}),  # type: ignore[call-arg]
+        r"`Rod` must have arguments among load, .*; got lods. Did you mean loads\?",
+    ),
     "a misspelt load": (lambda: em.Rod(load="unifrom"), r"`load` must be.*uniform"),
     "a misspelt end": (lambda: em.Rod(ends=("clampd", "free")), r"clamped"),
     "a misspelt descriptor": (

@@ -1,6 +1,7 @@
 /** The page: what is pinned, what is pointed at, and how clicks, drags and keys change that. */
 
 import { Appearance } from "./appearance";
+import { EnergyPanel } from "./energies";
 import { indexName, PINS, ROUTE_COLOUR } from "./colours";
 import { helpDialog, legend } from "./legend";
 import type { End, EquilibriumSet, Landing, Spot } from "./set";
@@ -23,6 +24,7 @@ export class App {
   readonly view: View;
   readonly shape: ShapePanel;
   readonly player: Player;
+  readonly energies: EnergyPanel;
   pins: { spot: Spot; letter: string }[] = [];
   current = -1;
   hover: Spot | null = null;
@@ -47,6 +49,7 @@ export class App {
     this.view = new View(set, this.appearance.colours);
     this.shape = new ShapePanel(set);
     this.player = new Player(set);
+    this.energies = new EnergyPanel(set, this.shape, (p) => this.goToPoint(p), (spot) => this.stand(spot, "arrived", null));
     this.player.onMove = () => this.refresh();
     this.build();
     this.listen();
@@ -82,7 +85,7 @@ export class App {
       h("div", { class: "below" },
         h("section", {}, h("h2", {}, "Numbers"), this.numbers),
         h("section", {}, h("h2", {}, "Equilibria here"), this.list, this.goTo()),
-        h("div", { class: "routes" }, this.player.element, this.wayPanel)),
+        h("div", { class: "routes" }, this.energies.element, this.player.element, this.wayPanel)),
       h("footer", {}, h("p", { class: "hint" }, `States between vertices are interpolated; pictures are within ${number(Math.max(words.fidelity, 1e-4), 1)} of the structure's size at vertices. Only equimorph, in Python, certifies a route. Nothing is loaded from the network.`)),
       help);
     this.drawLegend();
@@ -258,11 +261,13 @@ export class App {
       columns.push({ name, colour, spot, exact });
     };
     if (this.landing?.spot) ghost(this.landing.spot, "landing", "#b3261e", "✶");
-    const route = this.player.spot;
-    if (route && this.player.at > 0) ghost(route, "route", ROUTE_COLOUR, "●", true);
+    const route = this.player.at > 0 ? this.player.spot : null;
+    if (route) ghost(route, "route", ROUTE_COLOUR, "●", true);
     if (this.hover) ghost(this.hover, "pointer", "#444444", "○");
     (this.way ? [this.way.start, ...this.way.legs.map((leg) => leg.to)] : []).forEach((spot, k) => marks.push({ spot, text: String(k), colour: "#0b7a75", title: `Way-point ${k}`, kind: "way" }));
     this.view.setMarks(marks);
+    const shown = this.spot ?? route;
+    if (shown && !this.hover) this.energies.show(shown);
     this.shape.show(portraits);
     this.numbers.replaceChildren(numbersTable(this.set, columns, (k) => this.unpin(k)));
     if (this.spot && !this.hover) {

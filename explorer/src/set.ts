@@ -32,6 +32,8 @@ export class EquilibriumSet {
   readonly states: number;
   readonly modes: number;
   readonly numbers: number;
+  /** Vertices of index one, by their rows in `saddle_cells`; empty where the page has no barriers. */
+  readonly saddles: Map<number, number>;
   private neighbours: Int32Array | null = null;
   private facetKinds = new Map<string, "fold" | "branch point">();
   private readonly ranges: Record<number, [number, number]> = {};
@@ -50,6 +52,7 @@ export class EquilibriumSet {
     this.stratum = arrays.stratum as Int32Array;
     this.modes = arrays.low.length;
     this.numbers = arrays.mean.length;
+    this.saddles = new Map([...arrays.saddle_vertex].map((v, row) => [v, row]));
   }
 
   corner(cell: number, k: number): number { return this.cells[k * this.count + cell]; }

@@ -131,6 +131,9 @@ export class ShapePanel {
     return group;
   }
 
+  /** Points along the line of a state, to the right and upward. */
+  outline(spot: Spot): Point[] { return this.points(this.set.picture(spot), 0, this.set.words.layout[0].points).map(this.flat); }
+
   private path(points: Point[]): string { return points.map((p, i) => `${i ? "L" : "M"}${p[0].toFixed(5)} ${(-p[1]).toFixed(5)}`).join(""); }
 
   private line(picture: Float64Array, part: Part, dash: string, ribbon: number, main: boolean): SVGElement[] {

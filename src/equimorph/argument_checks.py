@@ -24,7 +24,7 @@ from equimorph.argument_kinds import (
     kind_of,
     short,
 )
-from equimorph.errors import InputError
+from equimorph.errors import InputError, suggestion
 
 Thing = TypeVar("Thing", bound=Callable[..., Any])
 
@@ -102,6 +102,7 @@ class Entry:
     ) -> tuple[tuple[Any, ...], dict[str, Any]]:
         """Return the arguments, some converted to the form that the function works with."""
         kinds, names = self._kinds, self._names
+        self._check_names(args, kwargs)
         changed: dict[str, Any] = {}
         for name, value in zip(names, args, strict=False):
             if not kinds[name].fits(value):
@@ -119,6 +120,26 @@ class Entry:
         if len(self._owning) + len(self._described) > 1:
             self._check_structures({**dict(zip(names, args, strict=False)), **kwargs})
         return args, kwargs
+
+    def _check_names(self, args: tuple[Any, ...], kwargs: Mapping[str, Any]) -> None:
+        """Refuse names that are no arguments, too many values, and calls without what is needed."""
+        kinds, first = self._kinds, len(args)
+        unknown = [] if self._other_name else [name for name in kwargs if name not in kinds]
+        missing = [name for name in self._needed if name not in self._names[:first]]
+        missing = [name for name in missing if name not in kwargs] if missing else missing
+        surplus = first > len(self._names) and not self._rest_name
+        if not (unknown or missing or surplus):
+            return
+        made = self._function.__name__ == "__init__"
+        name = type(args[0]).__name__ if made and args else self._function.__name__
+        known = [each for each in kinds if each != "self"]
+        allowed = f"`{name}` must have arguments among {', '.join(known) or 'none'}"
+        if unknown:
+            close = suggestion(unknown[0], known)
+            raise InputError(f"{allowed}; got {', '.join(unknown)}.{close}")
+        if missing:
+            raise InputError(f"`{name}` must have the argument {missing[0]}; got none.")
+        raise InputError(f"{allowed}; got {first - ('self' in kinds)} without names.")
 
     @cached_property
     def _parameters(self) -> Mapping[str, inspect.Parameter]:
@@ -148,6 +169,12 @@ class Entry:
         return {name: self._kind(name) for name in [*self._names, *self._of(KEYWORD)]}
 
     @cached_property
+    def _needed(self) -> list[str]:
+        """Arguments without default."""
+        given = self._parameters
+        return [name for name in self._kinds if given[name].default is inspect.Parameter.empty]
+
+    @cached_property
     def _rest_name(self) -> str:
         return next(iter(self._of(inspect.Parameter.VAR_POSITIONAL)), "")
 
@@ -156,8 +183,12 @@ class Entry:
         return self._kind(self._rest_name)
 
     @cached_property
+    def _other_name(self) -> str:
+        return next(iter(self._of(inspect.Parameter.VAR_KEYWORD)), "")
+
+    @cached_property
     def _other(self) -> Kind:
-        return self._kind(next(iter(self._of(inspect.Parameter.VAR_KEYWORD)), ""))
+        return self._kind(self._other_name)
 
     @cached_property
     def _owning(self) -> list[str]:

@@ -285,6 +285,12 @@ def _mapping(annotation: Any, name: str) -> Kind:
         joint = "." if isinstance(inside, Mapping) and inside else " = "
         return f"{label}{joint}{values.refused(inside)}"
 
+    def convert(value: Any) -> Any:
+        if not is_mapping(value):
+            raise TypeError
+        fitting = {key: each for key, each in value.items() if values.fits(each)}
+        return {k: fitting[k] if k in fitting else convert_value(values, value[k]) for k in value}
+
     numeric = by == "name" and values.fits(0.5)
     plain = values.several if values.words != ANYTHING.words else "values"
     example = f", like `{example}`" if values.fits(0.5) else ""
@@ -293,7 +299,8 @@ def _mapping(annotation: Any, name: str) -> Kind:
         words,
         f"{plain} by {by}",
         fits,
-        culprit=culprit,
+        convert,
+        culprit,
         holds=keys.holds | values.holds,
         by_name=numeric,
     )

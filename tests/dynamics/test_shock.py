@@ -163,10 +163,11 @@ def test_states_without_a_barrier_have_no_shock_and_bad_ones_are_refused(well):
 def test_the_least_impulse_of_an_arch_is_confirmed_by_mujoco():
     """Blows on the crown, in the two lowest modes, on a chain of 40 rigid links.
 
-    Both dampings agree for the lowest mode only: 10 % on either side of the least impulse.
+    Links are damped in proportion to their stiffness, the rod to its mass: with little damping both
+    least impulses tend to the same one, here within 15 %.
     """
     pytest.importorskip("mujoco", reason="MuJoCo is not installed (extra `replay`)")
-    arch, used = em.Rod(), em.ReplaySettings(step=0.04, damping=0.1)
+    arch, used = em.Rod(), em.ReplaySettings(step=0.04, damping=0.01)
     start = em.lift(arch.natural_state(Theta=1.0), {"q": 2.5}).end.state
     crown = arch.height(0.5)
     slope = Pushed(arch, crown, 1.0, 1.0).gradient(start.z[None], np.append(start.p, 0.0)[None])[0]
@@ -186,11 +187,11 @@ def test_the_least_impulse_of_an_arch_is_confirmed_by_mujoco():
     def snaps(size):
         plant = model.plant(start, 0.02, used.damping)
         plant._plant.data.qvel[:] = size * (places[0] - places[1]) / 2e-5
-        for _ in range(1500):
+        for _ in range(5000):
             plant.step()
         rest = landing(arch, plant.guess(), start.p)
         return np.sqrt(arch.mass @ (rest.z - start.z)[: arch.unknowns] ** 2) > SAME_SOLUTION
 
     assert not snaps(0.95 * np.sign(impulse.value) * impulse.bound)
-    assert not snaps(0.9 * impulse.value)
-    assert snaps(1.1 * impulse.value)
+    assert not snaps(0.85 * impulse.value)
+    assert snaps(1.15 * impulse.value)

@@ -58,7 +58,7 @@ def spring_page(spring_set: em.EquilibriumSet, tmp_path_factory: pytest.TempPath
     route = em.plan(spring_set, start, goal, margin=0.02)
     folder = tmp_path_factory.mktemp("explorer")
     return em.explore(
-        spring_set,
+        em.barriers(spring_set),
         {"around": route},
         folder / "spring.html",
         title="Spring </script><b>&amp;",

@@ -100,6 +100,24 @@ def test_as_many_states_are_listed_as_there_are(spring):
     assert found == np.where(np.abs(places[clear, 1]) < fold[clear], 3, 1).tolist()
 
 
+def test_the_tree_of_energies_is_that_of_the_closed_form(spring):
+    """Both minima are joined ½ (1 − x_l)² above them, at F = 0; beyond x_l = 1 there is one."""
+    spring("explorer.goToPoint([0.8, 0.0])")
+    spring(UPPER)
+    assert "leaves its basin with about" in spring.page.inner_text(".energies .hint")
+    assert spring("document.querySelectorAll('.tree .leaf').length") == 2
+    move = """(x) => { const [slider] = document.querySelectorAll('.energies input');
+    slider.value = x; slider.dispatchEvent(new Event('input'));
+    const top = Number(document.querySelector('.tree').getAttribute('aria-label').match(
+    /joined at ([0-9]+[.][0-9]+)/)?.[1]); return [explorer.set.parameters(
+    explorer.spot)[0], top]; }"""
+    for x in (0.7, 0.6):
+        assert spring(move, x) == pytest.approx([x, 0.5 * (1.0 - x) ** 2], abs=2e-3)
+    spring(move, 1.2)
+    assert spring("document.querySelectorAll('.tree .leaf').length") == 1
+    assert "No saddle" in spring.page.inner_text(".energies .hint")
+
+
 def test_a_drag_stops_at_the_fold_and_shows_the_landing(spring):
     """The spring at x_l = 0.8 loses its stability at F = (1 − 0.8^⅔)^{3/2}.
 

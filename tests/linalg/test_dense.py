@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from equimorph.linalg import negative_eigenvalues, orthonormal_rows, solve_bordered
 from equimorph.linalg.kernels import solve_lanes
-from equimorph.linalg.simd import work_rows
+from equimorph.linalg.simd import LANES, work_rows
 
 
 @settings(max_examples=60, deadline=None)
@@ -63,16 +63,16 @@ def test_entries_that_are_not_finite_count_as_minus_one():
 
 
 @pytest.mark.parametrize("size", [1, 2, 3, 6])
-def test_eight_small_systems_at_once_are_solved_with_row_exchanges(size):
+def test_small_systems_of_all_lanes_at_once_are_solved_with_row_exchanges(size):
     """Oracle: LAPACK; zeros in a corner need exchanges, its own in each lane. 1e-12: conditions."""
     generator = np.random.default_rng(1)
-    a = generator.normal(size=(8, size, size)) + 2 * np.eye(size)[::-1]
-    b = generator.normal(size=(8, size, 2))
+    a = generator.normal(size=(LANES, size, size)) + 2 * np.eye(size)[::-1]
+    b = generator.normal(size=(LANES, size, 2))
     a[::2, 0, 0] = 0.0 if size > 1 else 2.0
     rows = work_rows(size * (size + 2))
-    rows[:] = np.concatenate([a, b], axis=2).transpose(1, 2, 0).reshape(-1, 8)
+    rows[:] = np.concatenate([a, b], axis=2).transpose(1, 2, 0).reshape(-1, LANES)
     solve_lanes(rows, size, size + 2)
-    found = rows.reshape(size, size + 2, 8)[:, size:].transpose(2, 0, 1)
+    found = rows.reshape(size, size + 2, LANES)[:, size:].transpose(2, 0, 1)
     np.testing.assert_allclose(found, np.linalg.solve(a, b), rtol=1e-11, atol=1e-12)
 
 

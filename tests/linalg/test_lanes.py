@@ -7,6 +7,7 @@ import pytest
 
 import equimorph as em
 from equimorph.linalg.lanes import in_background, over_lanes, results_of, threads
+from equimorph.linalg.simd import LANES
 
 
 def _double(x, out):
@@ -22,7 +23,7 @@ def test_shares_of_a_batch_make_up_the_whole():
 
 @pytest.mark.parametrize("lanes", range(10))
 def test_a_few_lanes_are_filled_up_to_a_whole_vector(lanes: int):
-    """Kernels see eight lanes or more, and copies of the last one where there are fewer."""
+    """Kernels see a vector of lanes or more, and copies of the last one where there are fewer."""
     seen = []
 
     def kernel(x, out):
@@ -32,12 +33,12 @@ def test_a_few_lanes_are_filled_up_to_a_whole_vector(lanes: int):
     x, out = np.arange(1.0, lanes + 1.0), np.zeros(lanes)
     over_lanes(kernel, (), [x], [out])
     np.testing.assert_array_equal(out, 2.0 * x)
-    if 0 < lanes < 8:
-        assert seen[0].tolist() == [*x, *[lanes] * (8 - lanes)]
+    if 0 < lanes < LANES:
+        assert seen[0].tolist() == [*x, *[lanes] * (LANES - lanes)]
 
 
 def test_shares_begin_at_whole_vectors_and_none_is_small():
-    """Eight lanes a vector; a share of fewer than 256 lanes costs more than it saves."""
+    """Whole vectors; a share of fewer than 256 lanes costs more than it saves."""
     shares = []
     x, out = np.arange(1037.0), np.zeros(1037)
 

@@ -1,9 +1,9 @@
-"""Vectors of eight doubles inside compiled kernels."""
+"""Vectors of doubles inside compiled kernels."""
 
 import numpy as np
 from numba import njit
 
-from equimorph.linalg.simd import load, sincos, store, transpose, work_rows
+from equimorph.linalg.simd import LANES, load, sincos, store, transpose, work_rows
 
 
 @njit
@@ -16,7 +16,7 @@ def _sincos_rows(angles, sines, cosines):
 
 @njit
 def _transpose(source, target):
-    transpose(source, 2, 11, target, 0, 8)
+    transpose(source, 2, 11, target, 0, LANES)
 
 
 def test_sine_and_cosine_are_exact_to_two_units_in_the_last_place():
@@ -29,7 +29,7 @@ def test_sine_and_cosine_are_exact_to_two_units_in_the_last_place():
     angles = np.concatenate(
         [generator.uniform(-10, 10, 40000), generator.uniform(-1e4, 1e4, 8000), np.arange(-8, 8)]
     )
-    angles = np.concatenate([angles, np.arange(-8, 8) * np.pi / 2]).reshape(-1, 8)
+    angles = np.concatenate([angles, np.arange(-8, 8) * np.pi / 2]).reshape(-1, LANES)
     sines, cosines = np.empty_like(angles), np.empty_like(angles)
     _sincos_rows(angles, sines, cosines)
     for found, exact in ((sines, np.sin), (cosines, np.cos)):
@@ -40,18 +40,18 @@ def test_sine_and_cosine_are_exact_to_two_units_in_the_last_place():
 
 
 def test_sine_and_cosine_of_what_is_no_number_are_not_numbers():
-    angles = np.array([[np.nan, np.inf, -np.inf, 0.0, 1.0, 2.0, 3.0, 4.0]])
+    angles = np.array([np.nan, np.inf, -np.inf, 0.0, 1.0, 2.0, 3.0, 4.0]).reshape(-1, LANES)
     sines, cosines = np.empty_like(angles), np.empty_like(angles)
     _sincos_rows(angles, sines, cosines)
-    assert np.isnan(sines[0, :3]).all()
-    assert np.isnan(cosines[0, :3]).all()
-    assert np.isfinite(sines[0, 3:]).all()
+    assert np.isnan(sines.flat[:3]).all()
+    assert np.isnan(cosines.flat[:3]).all()
+    assert np.isfinite(sines.flat[3:]).all()
 
 
 def test_transposition_moves_every_entry_to_its_mirror_place():
-    source, target = np.arange(88.0).reshape(8, 11), np.empty((8, 8))
+    source, target = np.arange(11.0 * LANES).reshape(LANES, 11), np.empty((LANES, LANES))
     _transpose(source, target)
-    np.testing.assert_array_equal(target, source[:, 2:10].T)
+    np.testing.assert_array_equal(target, source[:, 2 : 2 + LANES].T)
 
 
 def test_work_arrays_start_on_a_cache_line():

@@ -135,3 +135,19 @@ def test_chains_with_a_reversed_link_end_where_they_lie_in_one_line():
     np.testing.assert_allclose(eset.points["span"][ends], 0.6, atol=0.01)
     lined_up = np.abs(np.sin(eset.points.z[ends, :5])).max(axis=1)
     assert lined_up.max() < 0.1
+
+
+@pytest.mark.parametrize("space", [False, True])
+def test_a_rod_that_is_pressed_ends_where_it_has_no_length(space):
+    """EA = 0.5 < 4: the straight rod never buckles and shortens by P/EA, to 0.99 at P = 0.495."""
+    shared = {"axial": 0.5, "loads": {"P": em.PointForce(1.0, (-1.0, 0.0))}, "elements": 2}
+    rod = em.Rod(ends=("clamped", "sliding"), **shared)
+    if space:
+        slider = em.SpatialEnd(x="free")
+        rod = em.SpatialRod(torsion=0.8, lateral=2.0, ends=("clamped", slider), **shared)
+    pressed = em.lift(rod.natural_state(), {"P": 0.3}).end.state
+    assert rod.max_shortening(pressed) == pytest.approx(0.6, rel=1e-12)
+    assert rod.max_shortening == rod.descriptor("max_shortening")
+    within = [rod.max_curvature <= 1.0]
+    eset = em.equilibrium_set(rod, em.Box(P=(0.0, 0.6)), within=within, intervals=(4,), checks=0)
+    assert eset.coordinates.max() == pytest.approx(0.495, rel=1e-9)

@@ -38,7 +38,7 @@ def bending(quadrature, theta, rigidity, natural):
     return quadrature.total(0.5 * rigidity * (quadrature.kappa(theta) - natural) ** 2)
 
 
-def sprung_rod():
+def sprung_rod(elements=4, degree=5):
     """Everything at once: springs, jumps of stiffness, five loads and actuators, coordinates."""
     rod = Rod(
         ends=(End(angle=0.02, x="held", y=2.0), End(x=1.5)),
@@ -51,8 +51,8 @@ def sprung_rod():
             "M": Couple(0.6),
         },
         coordinates={"turn": {"theta_A": 1.0, "theta_B": -1.0}, "reach": {"nu": 2.0}},
-        elements=4,
-        degree=5,
+        elements=elements,
+        degree=degree,
     )
     g = Quadrature(rod)
     before, after = 1 + g.s / 0.3, 1.5 - 0.5 * (g.s - 0.3) / 0.7
@@ -77,14 +77,14 @@ def sprung_rod():
     return rod, (0.4, 0.4, 0.5, 0.7, 0.5, 0.3, 0.05, 0.1), lagrangian
 
 
-def stretchable_cantilever():
+def stretchable_cantilever(elements=4, degree=5):
     """Free end B, axial stiffness that varies, load inside and at the end."""
     rod = Rod(
         ends=("clamped", "free"),
         axial=[[0, 3.0], [1, 5.0]],
         loads={"q": LineLoad("left-half", (0.5, -1.0)), "P": PointForce(1.0, (-1.0, 0.3))},
-        elements=4,
-        degree=5,
+        elements=elements,
+        degree=degree,
     )
     g = Quadrature(rod)
 
@@ -103,13 +103,13 @@ def stretchable_cantilever():
     return rod, (0.2, 0.4, 0.3), lagrangian
 
 
-def sliding_rod():
+def sliding_rod(elements=4, degree=5):
     """End A free in x, pinned to a line; end B clamped: one multiplier, positions from B."""
     rod = Rod(
         ends=(End(angle="free", x="free", y="held"), "clamped"),
         loads={"P": PointForce(0.5, (1.0, -1.0)), "M": Couple(0.0)},
-        elements=4,
-        degree=5,
+        elements=elements,
+        degree=degree,
     )
     g = Quadrature(rod)
 
@@ -125,15 +125,15 @@ def sliding_rod():
     return rod, (0.3, 0.4, 0.1, 0.1), lagrangian
 
 
-def rolling_rod():
+def rolling_rod(elements=4, degree=5):
     """End B rolls along an inclined line: one multiplier, across it."""
     slide, force = 0.7, (1.0, -1.0)
     rod = Rod(
         ends=("clamped", End(angle="free", slide=slide)),
         loads={"P": PointForce(0.5, force)},
         axial=4.0,
-        elements=4,
-        degree=5,
+        elements=elements,
+        degree=degree,
     )
     g = Quadrature(rod)
     t, n = np.array([[np.cos(slide), np.sin(slide)], [-np.sin(slide), np.cos(slide)]])
@@ -152,9 +152,9 @@ def rolling_rod():
     return rod, (0.3, 0.4, 0.1), lagrangian
 
 
-def stretchable_arch():
+def stretchable_arch(elements=4, degree=5):
     """Clamped, extensible: the multipliers have a trailing block."""
-    rod = Rod(axial=4.0, load="left-half", elements=4, degree=5)
+    rod = Rod(axial=4.0, load="left-half", elements=elements, degree=degree)
     g = Quadrature(rod)
 
     def lagrangian(z, p):
@@ -177,15 +177,15 @@ def places(mesh, slopes):
     return inside + (np.cumsum(whole, axis=1) - whole)[:, :, None]
 
 
-def inflated_rod():
+def inflated_rod(elements=4, degree=5):
     """Pressure on a curved rod whose ends are clamped and pinned at different heights."""
     rod = Rod(
         ends=("clamped", "pinned"),
         curvature=-1.5,
         actuators={"p": Pressure()},
         loads={"q": LineLoad()},
-        elements=4,
-        degree=5,
+        elements=elements,
+        degree=degree,
     )
     g = Quadrature(rod)
 
@@ -203,15 +203,15 @@ def inflated_rod():
     return rod, (0.8, 1.2, 0.5, 0.85, 0.05), lagrangian
 
 
-def inflated_rod_on_a_slope():
+def inflated_rod_on_a_slope(elements=4, degree=5):
     """Pressure on a rod that rolls along a line: −p (V − ½ X Y) along and across this line."""
     slope = 0.4
     rod = Rod(
         ends=("clamped", End(angle="free", slide=slope)),
         curvature=-1.5,
         loads={"p": Pressure()},
-        elements=4,
-        degree=5,
+        elements=elements,
+        degree=degree,
     )
     g = Quadrature(rod)
 
@@ -228,15 +228,15 @@ def inflated_rod_on_a_slope():
     return rod, (0.8, 1.2, 0.05), lagrangian
 
 
-def pulled_rod():
+def pulled_rod(elements=4, degree=5):
     """Cables along a part of a stretchable rod: they bend and compress it."""
     rod = Rod(
         ends=("clamped", End(angle="free", y="free")),
         axial=[[0, 4.0], [1, 6.0]],
         actuators={"T": [Tendon(0.1, 0.2, 0.8), Tendon([[0, -0.05], [1, 0.05]])]},
         loads={"q": LineLoad()},
-        elements=4,
-        degree=5,
+        elements=elements,
+        degree=degree,
     )
     g = Quadrature(rod)
 

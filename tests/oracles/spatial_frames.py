@@ -160,7 +160,7 @@ class SpaceTwin:
         return total
 
 
-def shed():
+def shed(elements=1, degree=5):
     """A hinge, a ball joint, arcs, inclined supports, springs, every load and actuator."""
     members = [
         SpatialMember(("A", "B", "C"), GJ=0.5, EI_out=2.0, EA=50.0, curvature=0.3,
@@ -187,12 +187,12 @@ def shed():
                 "length": {"A-B-C": 0.3},
             },
         },
-        elements=1,
-        degree=5,
+        elements=elements,
+        degree=degree,
     )  # fmt: skip
 
 
-def bend():
+def bend(elements=2, degree=4):
     """A right-angle bend between clamps: the smallest frame with multipliers alone."""
     return SpatialFrame(
         {"A": (0, 0, 0), "B": (1, 0, 0), "C": (1, 1, 0)},
@@ -200,5 +200,6 @@ def bend():
         {"A": "fixed", "C": "fixed"},
         {"P": {"B": (0, 0, -1)}},
         {"a": {"turn": {"A": (0, 0, 1.0)}}},
-        degree=4,
+        elements=elements,
+        degree=degree,
     )

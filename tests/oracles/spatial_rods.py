@@ -83,9 +83,9 @@ def columns(*parts):
     return np.stack(np.broadcast_arrays(*parts), axis=-1)
 
 
-def arch():
+def arch(elements=4, degree=5):
     """Uniform arch between clamps under its default load."""
-    rod = SpatialRod(torsion=0.77, lateral=1.4, elements=4, degree=5)
+    rod = SpatialRod(torsion=0.77, lateral=1.4, elements=elements, degree=degree)
     g = InSpace(rod)
 
     def lagrangian(z, p):
@@ -103,7 +103,7 @@ def arch():
     return rod, (0.9, 0.1, 0.05, -0.1, 0.05, 0.1, 0.5, 0.85, 0.05, -0.05), lagrangian
 
 
-def everything():
+def everything(elements=3, degree=4):
     """Springs, jumps of stiffness, intrinsic strains, gravity aslant, a tendon, stretch, shear."""
     rod = SpatialRod(
         torsion=[[0, 0.7], [0.3, 0.7], [0.3, 0.9], [1, 0.9]],
@@ -124,8 +124,8 @@ def everything():
             "P": [PointForce(0.7, (1.0, 0.5, -0.3)), PointForce(1.0, (0.0, 0.2, 0.6))],
         },
         coordinates={"reach": {"nu": 2.0}},
-        elements=3,
-        degree=4,
+        elements=elements,
+        degree=degree,
     )
     g = InSpace(rod)
 
@@ -155,7 +155,7 @@ def everything():
     return rod, (0.43, 0.1, -0.1, 0.2, 0.2, 0.1, 0.5, 0.2, 0.3, -0.1), lagrangian
 
 
-def cantilever():
+def cantilever(elements=3, degree=4):
     """Free end B, shear but no stretch, a load across the plane."""
     rod = SpatialRod(
         torsion=0.5,
@@ -163,8 +163,8 @@ def cantilever():
         ends=("clamped", "free"),
         shear=2.0,
         loads={"q": LineLoad("left-half", (0.5, -1.0, 0.3)), "P": PointForce(1.0, (0.1, 0.2, 1.0))},
-        elements=3,
-        degree=4,
+        elements=elements,
+        degree=degree,
     )
     g = InSpace(rod)
 
@@ -183,7 +183,7 @@ def cantilever():
     return rod, (0.2, 0.1, 0.3, 0.4, 0.3), lagrangian
 
 
-def guided():
+def guided(elements=4, degree=4):
     """End A slides along x, end B is clamped; no other load than in between."""
     rod = SpatialRod(
         torsion=0.8,
@@ -191,8 +191,8 @@ def guided():
         ends=("guided", "clamped"),
         loads={"P": PointForce(0.5, (1.0, -1.0, 0.5))},
         coordinates={},
-        elements=4,
-        degree=4,
+        elements=elements,
+        degree=degree,
     )
     g = InSpace(rod)
 
@@ -208,7 +208,7 @@ def guided():
     return rod, (0.2, 0.1, 0.3, -0.1, 0.2, 0.1, 0.4, 0.1, 0.05), lagrangian
 
 
-def coaxial():
+def coaxial(elements=4, degree=4):
     """Round rod between clamps on one axis, with the phase condition ∫ g t_z = 0."""
     rod = SpatialRod(
         torsion=0.7,
@@ -216,8 +216,8 @@ def coaxial():
         loads={"P": PointForce(0.5, (1.0, 0.0, 0.0))},
         axial=6.0,
         phase=True,
-        elements=4,
-        degree=4,
+        elements=elements,
+        degree=degree,
     )
     g = InSpace(rod)
 

@@ -37,6 +37,22 @@ def way(truss_set):
     return em.plan(truss_set, up, goal)
 
 
+def crown(eset):
+    return eset.structure.displacement("B", "y")
+
+
+def branch(eset):
+    """Over the load alone."""
+    return em.equilibrium_set(eset.structure, em.Box(**{LOAD: (-2e-3, 4e-3)}), checks=0)
+
+
+def reached(eset, route):
+    """The region of the joint, and a motion in it."""
+    start, move = route.path.states[0], eset.structure.displacement("B", "x")
+    place = {each: each(start) + change for each, change in ((crown(eset), -0.01), (move, 2e-3))}
+    return em.reachable(eset, start, list(place)), em.track(start, place, actuators=[LOAD, MOVE])
+
+
 FIGURES = {
     "surface": lambda eset, _: plotting.surface(eset),
     "parameter_plane": plotting.parameter_plane,
@@ -45,13 +61,27 @@ FIGURES = {
     "shapes": lambda _, route: plotting.shapes(route),
     "schedule_strips": lambda _, route: plotting.schedule_strips(route.schedule),
     "alternative_routes": lambda eset, route: plotting.alternative_routes(eset, [route, route]),
+    "route_panels": lambda eset, route: plotting.route_panels(eset, route, crown(eset)),
+    "portraits": lambda eset, _: plotting.portraits(eset.points[:2], [LOAD, MOVE]),
+    "diagram": lambda eset, _: plotting.diagram(branch(eset)),
+    "level_plane": lambda eset, _: plotting.level_plane(
+        eset, (em.value_of(eset.structure, MOVE), crown(eset)), em.effort_of(eset.structure, MOVE),
+        [0.0, 0.01]
+    ),
+    "chart_domain": lambda eset, _: plotting.chart_domain(
+        em.reduce(eset, prefer=em.charts.lowest(eset.structure.descriptor("energy")))
+    ),
+    "network_changes": lambda eset, _: plotting.network_changes(
+        em.network_changes(em.barriers(eset))
+    ),
+    "reach_panels": lambda eset, route: plotting.reach_panels(*reached(eset, route)),
 }  # fmt: skip
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", FIGURES)
 def test_figures_with_long_names_fit_at_all_sizes(name, truss_set, way):
-    with style.house_style():
+    with style.house_style(), unchecked():
         drawn = FIGURES[name](truss_set, way)
         figure = drawn if not hasattr(drawn, "figure") else drawn.get_figure(root=True)
         width, height = figure.get_size_inches()

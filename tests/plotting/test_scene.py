@@ -4,13 +4,12 @@ import io
 
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
 from PIL import Image
 
 from equimorph.plotting.depth import view_of
 from equimorph.plotting.scene import Curve, Scene
 from equimorph.plotting.shading import Paint
-from equimorph.plotting.style import attach_canvas
+from equimorph.plotting.style import Picture
 
 RED, GREEN = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)
 SQUARE = np.array([[[0, 0, 0], [1, 0, 0], [1, 1, 0]], [[0, 0, 0], [1, 1, 0], [0, 1, 0]]], float)
@@ -19,7 +18,7 @@ LINE = {"color": GREEN, "linewidth": 3.0}
 
 def drawn(curves, corners=SQUARE):
     """A red square at z = 0 with curves, seen from straight above."""
-    figure = attach_canvas(Figure(figsize=(2, 2), dpi=100))
+    figure = Picture(2, 2)
     axes = figure.add_axes((0, 0, 1, 1), projection="3d")
     axes.set_proj_type("ortho")
     axes.view_init(elev=90, azim=-90)

@@ -1,8 +1,12 @@
 """The looks of the house: colours, and figures that leave no trace in matplotlib's state."""
 
+import pickle
+from io import BytesIO
+
 import matplotlib as mpl
 import numpy as np
 import pytest
+from IPython.core.formatters import PNGFormatter
 from matplotlib.colors import to_rgb
 from PIL import Image
 
@@ -51,7 +55,20 @@ def test_indices_are_named(index, label):
     assert style.index_label(index) == label
 
 
-def test_saved_figure_has_column_width_at_two_hundred_dots_per_inch(tmp_path):
+def test_what_is_drawn_shows_itself_at_the_prompt_of_a_notebook():
+    """Figures, and all axes on them, as IPython looks for pictures; no backend has to be chosen."""
+    axes = style.new_axes(style.SINGLE_COLUMN, 2.0, ROOM)
+    formatter = PNGFormatter()
+    shown = formatter(axes), formatter(axes.get_figure())
+    assert shown[0] == shown[1]
+    with Image.open(BytesIO(shown[0])) as image:
+        assert image.size == (int(89 / 25.4 * style.SCREEN), 2 * style.SCREEN)
+    again = pickle.loads(pickle.dumps(axes.get_figure()))
+    assert formatter(again.axes[0]) == shown[0]
+
+
+def test_saved_figure_has_column_width_at_two_hundred_dots_per_inch(tmp_path, monkeypatch):
+    monkeypatch.setattr(style, "RESOLUTION", 200)
     axes = style.new_axes(style.SINGLE_COLUMN, 2.0, ROOM)
     png, svg = style.save(axes, tmp_path / "new", "figure")
     with Image.open(png) as image:

@@ -9,8 +9,9 @@ from equimorph import plotting
 from equimorph.errors import InputError
 from equimorph.model import Descriptor
 from equimorph.plotting import style
+from equimorph.plotting.raster_kernels import shade_pixel
 from equimorph.plotting.scene import Scene
-from equimorph.plotting.shading import corner_normals, lit
+from equimorph.plotting.shading import corner_normals
 
 
 def legend(ax):
@@ -73,9 +74,14 @@ def test_a_surface_is_lit_alike_from_both_sides():
     random = np.random.default_rng(0)
     normals, colours = random.normal(size=(20, 3)), random.uniform(size=(20, 3))
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    np.testing.assert_array_equal(lit(colours, normals), lit(colours, -normals))
-    assert lit(colours, normals).min() >= 0.0
-    assert lit(colours, normals).max() <= 1.0
+    lit = np.empty((2, 20, 3))
+    light, halfway = np.array([-0.50, 0.55, 0.67]), np.array([-0.27, 0.30, 0.915])
+    for turned, shaded in zip((normals, -normals), lit, strict=True):
+        for colour, normal, here in zip(colours, turned, shaded, strict=True):
+            shade_pixel(colour, normal, light, halfway, here)
+    np.testing.assert_array_equal(*lit)
+    assert lit.min() >= 0.0
+    assert lit.max() <= 1.0
 
 
 def test_the_surface_keeps_clear_of_its_legend(spring_set):

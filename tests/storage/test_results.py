@@ -118,12 +118,12 @@ def test_xarray_sees_the_numbers_of_any_answer(spring_set: EquilibriumSet, tmp_p
 
 
 def test_the_grid_follows_the_vtkhdf_specification(spring_set: EquilibriumSet, written: Path):
-    """VTKHDF 2.0, unstructured grid: fixed-length type, counts, offsets one longer than cells."""
+    """VTKHDF 1.0, unstructured grid: fixed-length type, counts, offsets one longer than cells."""
     with h5py.File(written) as file:
         grid = file["VTKHDF"]
         assert grid.attrs["Type"] == b"UnstructuredGrid"
         assert h5py.check_string_dtype(grid.attrs.get_id("Type").dtype).length == 16
-        assert list(grid.attrs["Version"]) == [2, 0]
+        assert list(grid.attrs["Version"]) == [1, 0]
         cells = len(spring_set.cells)
         assert grid["NumberOfCells"][...] == [cells]
         assert grid["NumberOfConnectivityIds"][...] == [3 * cells]

@@ -94,12 +94,17 @@ def test_energy_is_the_lagrangian_without_its_constraints(specimen, seed):
 
 @drawn_states
 def test_matrix_is_symmetric_and_the_derivative_of_the_residual(specimen, seed):
-    """Central differences, step 1e-3: error 1e-12 of the fifth derivative, 1e-13 of round-off."""
+    """Central differences, step 1e-3: error 1e-12 of the fifth derivative, 1e-13 of round-off.
+
+    Of the matrix, which is the inverse of solutions, round-off may be as large as its condition
+    number says: a hundredth of that is allowed for where it is above a billionth.
+    """
     structure = specimen.structure
     z, p, v, _ = specimen.states(seed=seed)
     matrix = full_matrix(structure, z, p)
-    scale = np.abs(matrix).max()
-    np.testing.assert_allclose(matrix, matrix.transpose(0, 2, 1), atol=1e-9 * scale)
+    asymmetry = np.abs(matrix - matrix.transpose(0, 2, 1)).max(axis=(1, 2), initial=0.0)
+    round_off = np.finfo(float).eps * np.linalg.cond(matrix)
+    assert (asymmetry <= np.maximum(1e-9, 0.01 * round_off) * np.abs(matrix).max()).all()
     slope = differenced(lambda t: structure.residual(z + t * v, p), 1e-3)
     product = np.einsum("lij,lj->li", matrix, v)
     np.testing.assert_allclose(product, slope, rtol=1e-7, atol=1e-8 * np.abs(product).max())
@@ -394,7 +399,7 @@ def test_a_natural_state_that_is_not_found_is_refused():
     [
         ({"kind": "plate"}, f"`kind` must be one of {', '.join(KINDS)}; got 'plate'"),
         ({}, f"`kind` must be one of {', '.join(KINDS)}; got None"),
-        ({"kind": "rod", "colour": "red"}, "`structure` must have the data of a rod"),
+        ({"kind": "rod", "colour": "red"}, "`Rod` must have arguments among load, .*; got colour"),
     ],
 )
 def test_a_wrong_identity_is_refused(identity, text):

@@ -80,3 +80,14 @@ def test_wrong_units_are_refused(rod):
         assert em.effort_of(em.Rod(), "Theta") <= "1 N m"
     with pytest.raises(InputError, match="must be compared with a finite number; got 'much'"):
         assert em.effort_of(rod, "theta_A") >= "much"
+
+
+def test_the_larger_couple_of_two_motors_is_named_in_a_text(rod):
+    """As it names itself; parts are separated outside their brackets only."""
+    text = "largest(abs(end_moment(0)), abs(end_moment(1)))"
+    larger, state = find_descriptor(rod, text), rod.natural_state(theta_A=0.3, theta_B=0.1)
+    ends = [abs(float(rod.descriptor(f"end_moment({end})")(state))) for end in (0, 1)]
+    assert (larger.name, larger.unit) == (text, "N mm")
+    assert float(larger(state)) == max(ends)
+    with pytest.raises(InputError, match=r"largest\(…, …\)"):
+        find_descriptor(rod, "largest(couple)")

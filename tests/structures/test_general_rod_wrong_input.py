@@ -63,7 +63,7 @@ WRONG = {
     ),
     "data of a term": (
         {"loads": {"P": {"term": "point force", "at": 1.0}}},
-        r"`loads\.P` must have the data of a point force \(s, direction\); got at",
+        r"`PointForce` must have arguments among s, direction; got at",
     ),
     "name taken": ({"loads": {"nu": em.Couple(0.5)}}, r"`loads\.nu` must have a different name"),
     "name twice": (

@@ -274,7 +274,7 @@ WRONG = [
     (lambda: em.Rod(section="strip", length=1.0), "`section` must be a section"),
     (
         lambda: em.Rod(section={"kind": "round", "d": 1}, length=1.0),
-        "`section` must have the data of a round",
+        "`Round` must have arguments among diameter, E, nu, density; got d",
     ),
     (
         lambda: em.Rod(section=em.Round(1.0, 1.0, 0.3)),

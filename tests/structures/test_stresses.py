@@ -165,3 +165,104 @@ def test_a_twisted_rectangle_bears_the_printed_shear(ratio, share):
         bent = np.array([[[0.0, 0.5, 0.25]]])  # the corner
         assert section.strain(bent).item() == pytest.approx(0.25 * width + 0.125 * thickness)
         assert section.stress(bent).item() == pytest.approx(2.6 * section.strain(bent).item())
+
+
+# --- members of frames ----------------------------------------------------------------------------
+
+ROUND = em.Round("4 mm", E="70 GPa", nu=0.33)
+AREA, MODULUS = 4.0 * np.pi, 2.0 * np.pi
+"""A = π d²/4 and W = π d³/32 of it."""
+LINE = {"A": (0, 0), "B": (300, 0)}
+
+
+def test_a_planar_member_bears_what_statics_say():
+    """A cantilever under a couple and a pull along it: σ = N/A + M/W, at any size of the bend.
+
+    Two members of unlike thickness in a row: each by itself, and the largest of both.
+    """
+    thick = em.Strip("20 mm", "2 mm", E="210 GPa", nu=0.3)
+    members = [em.Member(("A", "B"), section=ROUND), em.Member(("B", "C"), section=thick)]
+    frame = em.Frame({**LINE, "C": (500, 0)}, members, {"A": "fixed"},
+                     {"M": {"C": (0, 0, 1)}, "P": {"C": (1, 0)}}, units=UNITS)  # fmt: skip
+    bent = em.lift(frame.natural_state(), {"M": 500.0}).end.state
+    wire, strip = (frame.descriptor(f"max_stress({name})") for name in ("A-B", "B-C"))
+    assert wire(bent) == pytest.approx(500.0 / MODULUS, rel=1e-9)
+    assert strip(bent) == pytest.approx(500.0 / (20.0 * 2.0**2 / 6.0), rel=1e-9)
+    assert frame.max_stress(bent) == pytest.approx(500.0 / MODULUS, rel=1e-9)
+    assert frame.max_strain(bent) == pytest.approx(500.0 / MODULUS / 70e3, rel=1e-9)
+    assert frame.descriptor("safety_factor(300 MPa)")(bent) == pytest.approx(
+        300.0 * MODULUS / 500.0, rel=1e-9
+    )
+    pulled = em.lift(frame.natural_state(), {"P": 50.0}).end.state
+    assert frame.max_stress(pulled) == pytest.approx(50.0 / AREA, rel=1e-9)
+    assert strip(pulled) == pytest.approx(50.0 / 40.0, rel=1e-9)
+    assert wire.unit == "N/mm²"
+    largest = em.limit_load(frame.natural_state(), "M", within=[frame.max_stress <= "100 MPa"])
+    assert largest.value == pytest.approx(100.0 * MODULUS, rel=1e-6)
+
+
+def test_arcs_and_actuated_curvatures_are_free_of_stress():
+    """A cantilever that is bent by its own strains alone bears nothing."""
+    arc = em.Member(("A", "B"), section=ROUND, curvature=0.002)
+    frame = em.Frame(LINE, [arc], {"A": "fixed"}, actuators={"a": {"curvature": {"A-B": 0.001}}},
+                     units=UNITS)  # fmt: skip
+    turned = em.lift(frame.natural_state(), {"a": 2.0}).end.state
+    assert frame.max_curvature(turned) == pytest.approx(0.004, rel=1e-9)
+    assert frame.max_stress(turned) < 1e-6
+
+
+def test_a_bend_in_space_bears_bending_and_twist():
+    """A right-angled bend under P across it: at the clamp σ = √((P a/W)² + 3 (P b/(2W))²).
+
+    1e-6: P is small, and the bend moves by 1e-4 of its lengths.
+    """
+    joints = {"A": (0, 0, 0), "B": (300, 0, 0), "C": (300, 200, 0)}
+    member = em.SpatialMember(("A", "B", "C"), section=ROUND)
+    loads = {"P": {"C": (0, 0, -1)}, "N": {"B": (1, 0, 0)}}
+    frame = em.SpatialFrame(joints, [member], {"A": "fixed"}, loads, units=UNITS)
+    bent = em.lift(frame.natural_state(), {"P": 0.001}).end.state
+    stress = 0.001 / MODULUS * np.hypot(300.0, 0.5 * np.sqrt(3.0) * 200.0)
+    assert frame.max_stress(bent) == pytest.approx(stress, rel=1e-6)
+    assert frame.descriptor("max_strain(A-B-C)")(bent) == pytest.approx(
+        0.001 * 300.0 / MODULUS / 70e3, rel=1e-6
+    )
+    assert frame.max_stress(em.lift(frame.natural_state(), {"N": 20.0}).end.state) == pytest.approx(
+        20.0 / AREA, rel=1e-9
+    )
+
+
+@pytest.mark.parametrize("section", [STEEL, ROUND])
+def test_a_planar_frame_bears_in_space_what_it_bears_in_its_plane(section):
+    """A portal with hinges and a strut in tension and compression; 1e-7: both discretisations."""
+    flat = {"A": (0, 0), "B": (0, 200), "C": (250, 200), "D": (250, 0)}
+    pairs = [("A", "B"), ("B", "C"), ("C", "D"), ("B", "D")]
+    load, stress = {"F": {"B": (2e-3, -1e-3)}}, []
+    for kind, member, zero in (
+        (em.Frame, em.Member, ()),
+        (em.SpatialFrame, em.SpatialMember, (0,)),
+    ):
+        more = {"normal": (0.6, 0.8, 0)} if zero else {}
+        hinges = {"B": (0, 0, 1), "D": "ball"} if zero else pairs[3]
+        made = [member(each, section=section, **more) for each in pairs[:3]]
+        made.append(member(pairs[3], section=section, hinges=hinges, **more))
+        loads = {name: {j: (*v, *zero) for j, v in given.items()} for name, given in load.items()}
+        frame = kind({j: (*v, *zero) for j, v in flat.items()}, made,
+                     {"A": "fixed", "D": "fixed"}, loads, units=UNITS)  # fmt: skip
+        state = em.lift(frame.natural_state(), {"F": 10.0}).end.state
+        names = ["max_stress", "max_strain", *(f"max_stress({a}-{b})" for a, b in pairs)]
+        stress.append([frame.descriptor(name)(state) for name in names])
+        assert len(set(stress[-1])) >= 5
+    np.testing.assert_allclose(stress[1], stress[0], rtol=1e-7)
+
+
+def test_strain_of_a_member_without_section_is_refused_by_name():
+    members = [em.Member(("A", "B"), section=ROUND), em.Member(("B", "C"), EI="1 N m^2")]
+    frame = em.Frame({**LINE, "C": (500, 0)}, members, {"A": "fixed"}, {"P": {"C": (0, 1)}},
+                     units=UNITS)  # fmt: skip
+    with pytest.raises(MissingError, match="got member B-C without the size of its section"):
+        frame.descriptor("max_stress")
+    assert frame.descriptor("max_stress(A-B)").unit == "N/mm²"
+    with pytest.raises(em.InputError, match=r"`EI` of member A-B must be left out beside"):
+        em.Member(("A", "B"), EI=1.0, section=ROUND)
+    again = em.structures.from_identity(frame.identity())
+    assert again.signature == frame.signature

@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+import equimorph as em
+from equimorph.study.lookup import Extent, Ground, constraints_of
 from studies import SPRING_SET, answered, answered_again, page, rows_of
 
 QUESTIONS = """\
@@ -16,6 +18,12 @@ at = { x_l = 1.2, F = 0.0 }
 
 [[barriers]]
 name = "all"
+
+[[route]]
+name = "guarded"
+start = { at = { x_l = 0.8, F = 0.0 }, highest = "angle" }
+goal = { at = { x_l = 0.8, F = 0.0 }, lowest = "angle" }
+within = ["barrier >= 0.01"]
 
 [[least_shock]]
 name = "knock"
@@ -54,6 +62,56 @@ def test_barriers_over_the_set_are_those_of_settings(run):
     head, row = rows_of(out / "all-barriers.csv")
     assert float(row[head.index(next(x for x in head if x.startswith("barrier")))]) == most.energy
     assert state.stable
+
+
+def test_barriers_are_a_name_in_other_questions(run):
+    """Along the guarded route the barrier stays above its bound.
+
+    Under errors of x_l by 0.005 the least barrier at (0.8, 0) is ½ (1 − 0.805)².
+    """
+    outcome, out = run
+    field, route = em.barriers(outcome.equilibrium_set), outcome.of("route")["guarded"][0]
+    assert route.arrived
+    assert field.of(route.states).energy.min() > 0.01 * (1.0 - 1e-6)
+    assert (out / "explorer.html").exists()
+    erring = em.worst_over(field.eset.structure, field.descriptor, {"x_l": 0.005}, sense="min")
+    assert erring(route.states[[0, -1]]) == pytest.approx([0.0190125] * 2, abs=1e-9)
+
+
+HARD = """\
+[[route]]
+name = "hardest"
+start = { at = { x_l = 0.8, F = 0.0 }, highest = "angle" }
+goal = { at = { x_l = 0.8, F = 0.0 }, lowest = "angle" }
+objective = "least(barrier)"
+
+[[route]]
+name = "erring"
+start = { at = { x_l = 0.8, F = 0.0 }, highest = "angle" }
+goal = { at = { x_l = 0.8, F = 0.0 }, lowest = "angle" }
+within = ["lowest(barrier for x_l +- 0.005) >= 0.01"]
+"""
+
+
+@pytest.mark.slow
+def test_no_route_keeps_more_than_the_barrier_of_its_ends(tmp_path):
+    """That is 0.02; and the least barrier under errors of x_l stays above a bound on the way."""
+    outcome, _ = answered(tmp_path, SPRING_SET + HARD)
+    field = em.barriers(outcome.equilibrium_set)
+    hardest, erring = (outcome.of("route")[name][0] for name in ("hardest", "erring"))
+    assert hardest.bottleneck.value == pytest.approx(0.02, abs=1e-9)
+    assert field.of(hardest.states).energy.min() > 0.02 * (1.0 - 1e-6)
+    lowest = em.worst_over(field.eset.structure, field.descriptor, {"x_l": 0.005}, sense="min")
+    assert lowest(erring.states).min() > 0.01 * (1.0 - 1e-6)
+
+
+def test_barriers_have_units_and_need_a_set():
+    rod = em.Rod(span=0.95, EI=0.01, length=1.0)
+    extent = Extent(em.Box(Theta=(0.0, 1.0)), {}, (), (2,))
+    (bound,) = constraints_of(Ground(rod, extent), ["barrier >= 2 mJ"], "route[0].within")
+    assert bound.bound == pytest.approx(2e-3)
+    with pytest.raises(em.InputError, match=r"in `route\[0\].within\[0\]`"):
+        constraints_of(Ground(rod, None), ["barrier >= 2 mJ"], "route[0].within")
 
 
 def test_answers_are_read_from_their_folder(run):

@@ -11,6 +11,7 @@ from PIL import Image
 
 from equimorph import plotting
 from equimorph.errors import InputError
+from equimorph.plotting import style
 from equimorph.plotting.moving import suffixes
 from equimorph.storage import read_results, read_schedule
 from equimorph.study import Outcome, run_study
@@ -84,7 +85,7 @@ def test_stored_results_are_those_of_the_run(finished: tuple[Outcome, Path]):
 def test_figures_are_pictures_and_the_film_moves(finished: tuple[Outcome, Path]):
     for name in FIGURES:
         with Image.open(finished[1] / f"{name}.png") as picture:
-            assert min(picture.size) > 300
+            assert min(picture.size) > 1.5 * style.RESOLUTION
             assert len(set(picture.convert("L").resize((64, 64)).tobytes())) > 10
     with Image.open(finished[1] / "over-film.gif") as film:
         assert film.n_frames > 10

@@ -217,6 +217,19 @@ def test_no_route_is_found_just_below_the_least_torque():
     assert not below.arrived
 
 
+def test_a_start_without_a_way_on_is_itself_the_nearest_state(spring_set):
+    """Two vertices, and a bound that holds no other: no route leads from the start to itself."""
+    stable = list(spring_set.points[(spring_set.index == 0) & (spring_set.kinds == 0)])
+    ends = stable[0], stable[-1]
+    gap = em.Descriptor(
+        "gap", "1", lambda _, p: np.min([np.abs(p - end.p).max(axis=1) for end in ends], axis=0)
+    )
+    with unchecked():
+        route = em.plan(spring_set, *ends, within=[gap <= 1e-6])
+    assert route.status == "refused"
+    np.testing.assert_array_equal(route.nearest.p, ends[0].p)
+
+
 def test_refusals_say_how_far_each_demand_has_to_give_way(spring_set, sides):
     """Margin x (x − 1) where δ = 0: 0.3 needs x = 1.24162, and x = 1.2 allows 0.24."""
     with unchecked():

@@ -275,7 +275,7 @@ def reached(arm_set, count):
     with unchecked():
         tips = arm_set.over(k1=k[:, 0], k2=k[:, 1], k3=k[:, 2]).states
         answers = em.solve_shapes(arm_set, {each: each(tips) for each in pose})
-        places = em.solve_shapes(arm_set, {each: each(tips) for each in pose[:2]})
+        places = em.solve_shapes(arm_set, {each: each(tips).tolist() for each in pose[:2]})
     assert len(tips) == count
     for number, (answer, place) in enumerate(zip(answers, places, strict=True)):
         assert answer.solved

@@ -72,6 +72,22 @@ def test_random_rows_agree_with_loading_in_small_steps():
 
 
 @pytest.mark.slow
+def test_a_unit_does_not_snap_over_a_low_barrier_of_another():
+    """Row 554 of benchmarks/rows.py: where the first unit snaps, the last one nearly does."""
+    with unchecked():
+        ours, undecided, brute = rows.compare(rows.structure(5), 5, _row(554))
+    assert ours == brute
+    assert not any(undecided.values())
+
+
+def _row(number):
+    """Random numbers of a row, after that of its units is drawn."""
+    rng = np.random.default_rng([0, number])
+    rng.integers(3, 6)
+    return rng
+
+
+@pytest.mark.slow
 def test_eight_units_have_6561_equilibria_and_follow_the_rule_of_preisach():
     """The weakest unit that can snaps first, both ways [Preisach1935]."""
     units = [f"{1 + 0.13 * k}*(u*(u - 2))**2/4" for k in range(8)]

@@ -1,6 +1,6 @@
 """What becomes of structures that are launched: whether they come back, and where they land."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
 
 import numpy as np
@@ -23,6 +23,14 @@ PATIENCE = 12.0
 """Longest time of a motion, in times in which free vibrations lose energy by the factor e."""
 AT_LEAST = 40.0
 """And the shortest limit, in units of the model's time T."""
+GAIN = 0.02
+"""Share of its first energy, above that of its home, by which that of a passive motion may seem to
+grow; a larger gain says that the step in time is too long for the vibrations that are excited."""
+RESOLVED = 0.4
+"""Longest step in time, over the highest frequency that a disturbance excites: with half of it the
+same knocks of the arch snap."""
+HALVINGS = 4
+"""How often the step in time is halved for motions that are lost."""
 FARTHEST = 10.0
 """Way in the metric after which a motion has left for infinity, in extents of the guesses."""
 
@@ -36,7 +44,7 @@ class Outcome(IntEnum):
     LEFT = 1
     ESCAPED = 2
     LOST = 3
-    """A step in time was not found."""
+    """A step in time was not found, or the energy grew, with the shortest step, too."""
 
 
 @dataclass(frozen=True)
@@ -62,6 +70,12 @@ class Clock:
     rate: float
     unit: float
 
+    @classmethod
+    def resolving(cls, frequencies: Values, step: float, rate: float, unit: float) -> "Clock":
+        """Steps that resolve vibrations of some frequencies, and are no longer than one."""
+        highest = float(frequencies[np.isfinite(frequencies)].max(initial=0.0))
+        return cls(RESOLVED / max(highest, RESOLVED / step), rate, unit)
+
     @property
     def steps(self) -> int:
         """Most steps of one motion."""
@@ -75,7 +89,7 @@ class Clock:
 
 
 @dataclass(frozen=True)
-class Outcomes:
+class Outcomes(Columns):
     """`Outcome` of each launch, and where each was when it was decided."""
 
     code: Int[np.ndarray, " lanes"]
@@ -88,8 +102,22 @@ def play(structure: Structure, launches: Launches, clock: Clock, *, watch: bool)
 
     From then on each motion stays in the piece of the configurations below that energy in which it
     is, at home or elsewhere, and the gradient flow tells which. With `watch` a motion has left as
-    soon as the flow leads elsewhere from where it is, even if it would come back later.
+    soon as the flow leads elsewhere from where it is, even if it would come back later. Motions
+    that are lost are played again with half the step.
     """
+    found = _play(structure, launches, clock, watch=watch)
+    for _ in range(HALVINGS):
+        lost = np.flatnonzero(found.code == Outcome.LOST)
+        if len(lost) == 0:
+            break
+        clock = replace(clock, step=0.5 * clock.step)
+        again = _play(structure, launches.take(lost), clock, watch=watch)
+        found = found.with_rows(lost, again)
+    return found
+
+
+def _play(structure: Structure, launches: Launches, clock: Clock, *, watch: bool) -> Outcomes:
+    """Let structures move with one length of steps."""
     count = len(launches.z)
     code, todo = np.full(count, int(Outcome.OPEN)), np.arange(count)
     motion = Motion.of(launches.z, launches.velocity)
@@ -97,12 +125,15 @@ def play(structure: Structure, launches: Launches, clock: Clock, *, watch: bool)
     bottom = structure.energy(launches.home, launches.p)
     edge = bottom + NEAR_TOP * (launches.level - bottom)
     highest, every = structure.energy(launches.z, launches.p), clock.looks
+    first = motion.energy(structure, launches.p)
+    most = first + GAIN * np.abs(first - bottom)
     far = FARTHEST * extent_of_guesses(structure, launches.p)
     for number in range(clock.steps):
         p = launches.p[todo]
         highest[todo] = np.maximum(highest[todo], structure.energy(motion.z, p))
         if number % every == 0:
-            low = motion.energy(structure, p) < launches.level[todo]
+            energy = motion.energy(structure, p)
+            low = energy < launches.level[todo]
             seen = np.flatnonzero(low | (watch & (highest[todo] >= edge[todo])))
             highest[todo] = -np.inf
             now = np.where(low, int(Outcome.HELD), int(Outcome.OPEN))
@@ -111,6 +142,7 @@ def play(structure: Structure, launches: Launches, clock: Clock, *, watch: bool)
             now[seen[lost & low[seen]]] = Outcome.LOST
             way = (motion.z - launches.z[todo])[:, : structure.unknowns]
             now[metric_length(structure, way) > far] = Outcome.ESCAPED
+            now[~(energy <= most[todo])] = Outcome.LOST
             code[todo], last[todo], speed[todo] = now, motion.z, motion.velocity
             keep = np.flatnonzero(now == Outcome.OPEN)
             motion, todo = motion.take(keep), todo[keep]

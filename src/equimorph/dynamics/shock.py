@@ -220,12 +220,14 @@ class _Trial:
         self.state, self.saddle, self.structure = state, saddle, state.structure
         model = OwnModel(state.structure, state)
         rate = model.damping_rate(used.damping)
-        self.clock = Clock(used.step * model.unit, rate, model.unit)
         structure, z, p = self.structure, state.z[None], state.p[None]
         self.mass = structure.inertia(z, p)[0]
         free = structure.unknowns - structure.constraints
         count = min(modes, free) if structure.is_discretised else free
-        self._modes = vibrations(structure, z, p, count).modes[0]
+        free_vibrations = vibrations(structure, z, p, count)
+        self._modes = free_vibrations.modes[0]
+        step = used.step * model.unit
+        self.clock = Clock.resolving(free_vibrations.frequencies[0], step, rate, model.unit)
         self.level = float(structure.energy(saddle.z[None], p)[0])
         self.height = self.level - float(structure.energy(z, p)[0])
 

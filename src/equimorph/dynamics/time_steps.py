@@ -53,11 +53,11 @@ class Motion(Columns):
         self, structure: Structure, p: Parameters, h: float, rate: float
     ) -> tuple["Motion", Flags]:
         """Motions one step later, and which of them Newton's method found."""
-        n, z = structure.unknowns, self.z.copy()
-        u = z[:, :n].copy()
+        n, ahead = structure.unknowns, self.z.copy()
+        u = self.z[:, :n].copy()
         first = np.where(self._begun, 1.5, 1.0)
-        ahead = z.copy()
         ahead[:, :n] += h * self.velocity
+        z = ahead.copy()
         faster = np.where(self._begun, 2.0 * self.velocity - self.velocity_before, self.velocity)
         mass = structure.inertia(ahead, p)
         gamma = structure.inertial_force(ahead, p, faster)

@@ -21,8 +21,12 @@ from equimorph.equilibria.soft_modes import Modes, SoftModes, metric_length, sof
 from equimorph.linalg import multiply
 from equimorph.structures import Structure
 
-NUDGES = (0.2, 0.02, 0.002)
-"""Distances from the start along its mode, in lengths of the mode, from which the flow is tried."""
+NUDGES = (0.002, 0.02, 0.2)
+"""Distances from the start along its mode, in lengths of the mode, from which the flow is tried.
+
+The largest one counts that leads away as all smaller ones do: beyond a fold, where the energy
+rises at first, a larger one may step over a low barrier.
+"""
 SHORTER = (1.0, 0.1, 0.01, 0.001)
 """Lengths of steps there, relative to the longest."""
 ASIDE = 4.0
@@ -107,10 +111,10 @@ def _starts(
     # stiff modes relax, the soft one is not amplified much
     growth = np.maximum(np.abs(soft.eigenvalue), 1e-300)
     longest = np.minimum(10.0 / soft.stiffness, 0.3 / growth)
-    start, leaves, told = z.copy(), np.zeros(len(z), bool), np.zeros(len(z), bool)
+    start, leaves, told, back = z.copy(), *np.zeros((3, len(z)), bool)
     length = np.zeros(len(z))
     for size in nudges:
-        todo = np.flatnonzero(~leaves)
+        todo = np.flatnonzero(~back)
         for shorter in SHORTER:
             if len(todo) == 0:
                 break
@@ -118,6 +122,7 @@ def _starts(
             h = shorter * longest[todo]
             moved, away, solved = _relax(structure, z[todo], p[todo], nudge, h)
             told[todo[solved]] = True
+            back[todo[solved & (away <= 0.0)]] = True
             gone = todo[solved & (away > 0.0)]
             leaves[gone], start[gone] = True, moved[solved & (away > 0.0)]
             length[gone] = size * soft.length[gone]

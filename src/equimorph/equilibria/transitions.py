@@ -188,7 +188,7 @@ class TransitionNetwork:
         """
         row = int(np.flatnonzero(self.saddles == saddle)[0])
         structure, top = self.states.structure, self.states[[saddle]]
-        led = descend(structure, top.z, top.p, SMOOTH, NUDGES[1:])
+        led = descend(structure, top.z, top.p, SMOOTH, NUDGES[:-1])
         for end, lane in zip(self.ends[row].tolist(), led.lane[:, 0].tolist(), strict=True):
             onward = self._descent(end, goal) if end in self.saddles else None
             if end != goal and onward is None:

@@ -4,6 +4,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
+from typing import Literal
 
 import numpy as np
 
@@ -25,34 +26,42 @@ SAME_SHEET = 1e-3
 """Distance in the structure's metric over which a given state is corrected at most: at a fold a
 longer correction leads to another sheet."""
 
-_WORST = re.compile(r"\s*worst\((.*) for (.*)\)\s*", re.DOTALL)
+_WORST = re.compile(r"\s*(worst|lowest)\((.*) for (.*)\)\s*", re.DOTALL)
 _OFFSET = re.compile(r"\s*(\w+)\s*(?:±|\+-)\s*([\d.eE+-]+)\s*")
 
 
 @check_arguments
 def worst_over(
-    structure: Structure, descriptor: Descriptor, offsets: Mapping[str, float]
+    structure: Structure,
+    descriptor: Descriptor,
+    offsets: Mapping[str, float],
+    sense: Literal["max", "min"] = "max",
 ) -> Descriptor:
-    """Largest value of a descriptor over a box of imperfections around a state.
+    """Largest value of a descriptor over a box of imperfections around a state, or the smallest.
 
     The state is lifted along straight lines to the corners of the box. The result is the largest
-    value at the corners and at the state itself, ∞ where stability is lost on the way. The single
-    values are its branches, so that `optimise` finds its minima, kinks included, exactly.
+    value at the corners and at the state itself, ∞ where stability is lost on the way; or the
+    smallest, and −∞. The single values are its branches, so that `optimise` finds its minima, kinks
+    included, exactly.
 
     Parameters
     ----------
     offsets
         Largest errors of parameters, by name: actuators, loads or others.
+    sense
+        "max" for what must stay below a bound, "min" for what must stay above one.
 
     Raises
     ------
     InputError
         If a name is unknown, there is none, or a size is not positive.
     """
-    box = _Corners(structure, descriptor, _corners(structure, offsets))
+    sign = 1.0 if sense == "max" else -1.0
+    box = _Corners(structure, descriptor, _corners(structure, offsets), sign)
     sizes = ", ".join(f"{name} ± {float(size)!r}" for name, size in offsets.items())
-    name = f"worst({descriptor.name} for {sizes})"
-    symbol = f"worst {descriptor.symbol or descriptor.name}"
+    word = "worst" if sense == "max" else "lowest"
+    name = f"{word}({descriptor.name} for {sizes})"
+    symbol = f"{word} {descriptor.symbol or descriptor.name}"
     unit, origin = descriptor.unit, structure.signature
     return Descriptor(name, unit, box.worst, symbol, origin, branches=box.branches)
 
@@ -150,11 +159,18 @@ class _Ray:
 
 
 @check_arguments
-def worst_named(structure: Structure, text: str) -> Descriptor:
+def worst_named(
+    structure: Structure, text: str, known: Mapping[str, Descriptor] | None = None
+) -> Descriptor:
     """Descriptor that a text means: as `find_descriptor`, or the worst of one over a box.
 
     ``worst(max_curvature for Theta ± 0.01, Delta ± 0.02)``, with ``+-`` for ``±`` where that cannot
-    be typed; see `worst_over`.
+    be typed, is the largest value, ``lowest(…)`` the smallest one; see `worst_over`.
+
+    Parameters
+    ----------
+    known
+        Descriptors by name that come before those of the structure.
 
     Raises
     ------
@@ -163,8 +179,8 @@ def worst_named(structure: Structure, text: str) -> Descriptor:
     """
     found = _WORST.fullmatch(text)
     if found is None:
-        return find_descriptor(structure, text)
-    parts = [_OFFSET.fullmatch(part) for part in found[2].split(",")]
+        return (known or {}).get(text.strip()) or find_descriptor(structure, text)
+    parts = [_OFFSET.fullmatch(part) for part in found[3].split(",")]
     try:
         offsets = {each[1]: float(each[2]) for each in parts if each}
     except ValueError:
@@ -173,20 +189,25 @@ def worst_named(structure: Structure, text: str) -> Descriptor:
         raise InputError(
             f"`worst` must read like worst(energy for Theta ± 0.01, Delta ± 0.02); got {text!r}."
         )
-    return worst_over(structure, worst_named(structure, found[1]), offsets)
+    inner = worst_named(structure, found[2], known)
+    return worst_over(structure, inner, offsets, sense="max" if found[1] == "worst" else "min")
 
 
 @dataclass(frozen=True)
 class _Corners:
-    """A descriptor, and offsets of all parameters at which it is evaluated; the first is zero."""
+    """A descriptor, and offsets of all parameters at which it is evaluated; the first is zero.
+
+    With the sign −1 its smallest value is the worst.
+    """
 
     structure: Structure
     descriptor: Descriptor
     corners: Float[np.ndarray, "corners parameters"]
+    sign: float
 
     def worst(self, z: Lanes, p: Parameters) -> Values:
-        """Largest value."""
-        return np.asarray(self._values(z, p).max(axis=1))
+        """Largest value, or smallest."""
+        return np.asarray(self.sign * (self.sign * self._values(z, p)).max(axis=1))
 
     def branches(
         self, z: Lanes, p: Parameters
@@ -195,7 +216,7 @@ class _Corners:
         return self._values(z, p), np.tile(np.arange(float(len(self.corners))), (len(z), 1))
 
     def _values(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes m"]:
-        out = np.full((len(z), len(self.corners)), np.inf)
+        out = np.full((len(z), len(self.corners)), self.sign * np.inf)
         here, stable = _stable_states(self.structure, z, p)
         lanes = np.flatnonzero(stable)
         if len(lanes) == 0:
@@ -206,7 +227,7 @@ class _Corners:
         line = ParameterLine(self.structure, p[many], velocity)
         ended = trace(line, here[many], (), TraceOptions(record=False))
         good = np.flatnonzero(ended.code == EventCode.ARRIVED)
-        values = np.full(len(many), np.inf)
+        values = np.full(len(many), self.sign * np.inf)
         values[good] = self.descriptor.function(ended.z[good], p[many[good]] + velocity[good])
         out[lanes, 1:] = values.reshape(len(lanes), -1)
         return out

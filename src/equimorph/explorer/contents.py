@@ -8,7 +8,7 @@ or lies in a cell.
 import json
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from typing import Any
 
 import numpy as np
@@ -21,6 +21,7 @@ from equimorph.explorer.pictures import FIDELITY, gallery, quantise, size_of
 from equimorph.manifold import (
     EdgeMiddles,
     EquilibriumSet,
+    SetBarriers,
     SnapGraph,
     edge_middles,
     overturned_cells,
@@ -131,6 +132,7 @@ class Question:
     routes: Mapping[str, Route]
     snaps: SnapGraph
     reduction: Reduction | None
+    barriers: SetBarriers | None
     descriptors: tuple[Descriptor, ...]
     title: str
 
@@ -194,6 +196,7 @@ def contents(asked: Question) -> tuple[dict[str, Any], Arrays]:
         "step": shown.step.astype(np.float32),
         "coefficients": shown.coefficients,
         **snap_arrays,
+        **_saddles(asked.barriers),
         **scalar_arrays,
     }
     return words, arrays
@@ -334,6 +337,13 @@ def _snaps(graph: SnapGraph, extra: _States) -> tuple[list[dict[str, Any]], Arra
     }  # fmt: skip
     arrays: Arrays = {name: np.asarray(each, dtype=np.int32) for name, each in whole.items()}
     return runs, arrays | {"snap_released": np.asarray(released, dtype=np.float32)}
+
+
+def _saddles(field: SetBarriers | None) -> Arrays:
+    """Vertices of index one, and the cells on which descents from them end."""
+    found = None if field is None else field.saddle_landings
+    vertices, cells = (np.zeros(0), np.zeros((0, 2))) if found is None else astuple(found)
+    return {"saddle_vertex": vertices.astype(np.int32), "saddle_cells": cells.astype(np.int32)}
 
 
 def _barriers(reduction: Reduction, extra: _States) -> list[dict[str, Any]]:

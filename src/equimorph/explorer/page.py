@@ -13,7 +13,7 @@ from equimorph.charts import Reduction
 from equimorph.errors import InputError
 from equimorph.explorer.contents import Question, contents
 from equimorph.explorer.pictures import json_in_html, pack
-from equimorph.manifold import EquilibriumSet, SnapGraph, snap_graph
+from equimorph.manifold import EquilibriumSet, SetBarriers, SnapGraph, snap_graph
 from equimorph.model import Descriptor, Progress
 from equimorph.storage.files import write_text
 from equimorph.tasks.route import Route
@@ -24,7 +24,7 @@ SCRIPT = "explorer.min.js"
 
 @check_arguments
 def explore(
-    eset: EquilibriumSet,
+    eset: EquilibriumSet | SetBarriers,
     route: Route | Mapping[str, Route] | None = None,
     path: str | Path = "explorer.html",
     *,
@@ -44,7 +44,9 @@ def explore(
     Parameters
     ----------
     eset
-        Equilibrium set over one, two or three free parameters, with at least one cell.
+        Equilibrium set over one, two or three free parameters, with at least one cell; or energy
+        barriers over one: the page then draws, too, at which energies the stable states over the
+        same parameters join, with a slider for each parameter.
     route
         A route, or several by name, to play and to scrub; a refused one is shown as far as it goes.
     path
@@ -72,17 +74,18 @@ def explore(
         the reduction is of another structure, the snap graph of another set, or the file cannot
         be written.
     """
+    barriers, shown = (eset, eset.eset) if isinstance(eset, SetBarriers) else (None, eset)
     place = Path(path)
     if place.suffix != ".html":
         raise InputError(f"`path` must end in .html; got {str(path)!r}.")
-    if not len(eset.cells):
+    if not len(shown.cells):
         raise InputError("`eset` must have cells to be shown; got an empty set.")
-    if snaps is not None and snaps.eset is not eset:
+    if snaps is not None and snaps.eset is not shown:
         raise InputError(f"`snaps` must be of `eset`; got those of {snaps.eset}.")
     routes = {"route": route} if isinstance(route, Route) else dict(route or {})
-    graph = snaps or snap_graph(eset, progress=progress)
-    heading = title or f"Equilibrium set of a {eset.structure.kind}"
-    asked = Question(eset, routes, graph, reduction, tuple(descriptors), heading)
+    graph = snaps or snap_graph(shown, progress=progress)
+    heading = title or f"Equilibrium set of a {shown.structure.kind}"
+    asked = Question(shown, routes, graph, reduction, barriers, tuple(descriptors), heading)
     write_text(place, _page(asked))
     return place
 

@@ -46,7 +46,7 @@ def solve_condensed(
 
     diagonal (lanes, nodes); border (lanes, m, nodes); columns (lanes, k, n + m) and rows alike;
     corner (lanes, k, k); rhs (lanes, r, n + m + k); trailing T (lanes, m, m); x like rhs. At least
-    eight lanes; the last block overlaps the one before. Products aᵀH⁻¹b need forward-reduced
+    `LANES` lanes; the last block overlaps the one before. Products aᵀH⁻¹b need forward-reduced
     columns only, in the order B, C, right-hand sides, R; just the combined right-hand sides are
     substituted back.
     """
@@ -104,7 +104,7 @@ def solve_condensed(
 
 @njit(**INNER)
 def reduce_block(stiffness, ends, block, m, k, r, lower, vertices, work, extremes, left, products):
-    """Factor H of eight lanes, reduce its columns, and multiply those of the border with all."""
+    """Factor H of all lanes, reduce its columns, and multiply those of the border with all."""
     elements, inner, nodes = stiffness.shape[0], stiffness.shape[1] - 2, block.shape[0]
     first, last = min(ends[0], 1), nodes - 1 - min(elements - ends[1], 1)
     tiles = tiles_of(m, k, r)

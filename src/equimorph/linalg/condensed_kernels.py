@@ -1,11 +1,11 @@
-"""Compiled kernels of the condensed layout: eight lanes at a time.
+"""Compiled kernels of the condensed layout: a vector of lanes at a time.
 
 One matrix H per lane is the sum of element matrices (the same for every lane) and a diagonal (its
 own for every lane). Elements are chained: the last node of one is the first node of the next. Inner
 nodes are eliminated inside each element; what remains is tridiagonal in the vertices. Everything is
 kept as ``LDLᵀ`` so that the signs of the pivots are the inertia (Sylvester).
 
-Work arrays have rows of eight lanes. Columns lie in tiles, ``columns[tile, node, slot]``: the
+Work arrays have rows of lanes. Columns lie in tiles, ``columns[tile, node, slot]``: the
 `TILE` slots of a node are one bundle, so that one entry of L serves eight columns while it is in a
 register. The first two slots of the first tile are the *ties*, the columns of an element's inner
 nodes at its left and right vertex: eliminated like any other column, they leave the Schur

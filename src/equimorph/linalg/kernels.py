@@ -26,7 +26,7 @@ much as the arithmetic.
 
 @njit(**INNER)
 def solve_lanes(a, size, width):
-    """Gauss with partial pivoting on eight systems: a (size, width, 8), right sides last."""
+    """Gauss with partial pivoting on `LANES` systems: a (size, width, lanes), right sides last."""
     for k in range(size):
         for i in range(k + 1, size):
             here, there = absolute(load(a, k * width + k)), absolute(load(a, i * width + k))

@@ -136,7 +136,7 @@ def over_lanes(
     """Call ``kernel(*shared, *inputs, *outputs)``, the batches cut along lanes into one per thread.
 
     Kernels treat lanes independently, so that the result does not depend on the number of threads.
-    They need at least eight lanes: fewer are filled up with copies of the last one.
+    They need at least a vector of lanes: fewer are filled up with copies of the last one.
     """
     lanes = len(inputs[0])
     if 0 < lanes < LANES:

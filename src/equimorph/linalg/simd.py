@@ -1,8 +1,8 @@
-"""Vectors of eight doubles, and bundles of them, as types inside compiled kernels.
+"""Vectors of `LANES` doubles, and bundles of them, as types inside compiled kernels.
 
 The compiler cannot prove that the arrays of a kernel do not overlap, so it leaves loops over lanes
-scalar; explicit vectors make one instruction serve eight lanes. Work arrays have a last axis of
-length 8 and are read and written by row: ``load(array, row)`` where `row` counts along the
+scalar; explicit vectors make one instruction serve them. Work arrays have a last axis of
+length `LANES` and are read and written by row: ``load(array, row)`` where `row` counts along the
 flattened leading axes. A *bundle* is 2, 4 or 8 consecutive rows handled as one value: independent
 chains of operations that hide each other's latency.
 """
@@ -11,19 +11,21 @@ import operator
 
 import numpy as np
 from llvmlite import ir
+from llvmlite.binding import get_host_cpu_features
 from numba.core import cgutils, types
 from numba.core.typing.templates import ConcreteTemplate, infer_global, signature
 from numba.extending import intrinsic, lower_builtin, models, register_model
 
 from equimorph.linalg.compiled import njit
 
-LANES = 8
+LANES = 8 if get_host_cpu_features().get("avx512f") else 4
+"""Lanes of a vector: doubles in one register of the processor, so that bundles stay in these."""
 _FLAGS = ("contract",)
 _INDEX = ir.IntType(32)
 
 
 class Bundle(types.Type):
-    """Numba type of `rows` times eight doubles in one vector."""
+    """Numba type of `rows` vectors of doubles in one vector."""
 
     def __init__(self, rows: int) -> None:
         self.rows = rows
@@ -31,7 +33,7 @@ class Bundle(types.Type):
 
 
 _BUNDLES = {rows: Bundle(rows) for rows in (1, 2, 4, 8)}
-float64x8 = _BUNDLES[1]
+float64s = _BUNDLES[1]
 
 
 def _vector(rows, entry=None):
@@ -76,7 +78,7 @@ def _pointer(context, builder, array_type, array, offset, vector):
 def _loader(rows):
     @intrinsic
     def load_rows(typing_context, array, row):
-        """Consecutive rows from `row` of a C-ordered array whose last axis has eight entries."""
+        """Consecutive rows from `row` of a C-ordered array with vectors on its last axis."""
         sig = _BUNDLES[rows](array, types.intp)
 
         def generate(context, builder, sig, args):
@@ -134,15 +136,15 @@ def set_entry(typing_context, array, position, number):
 
 @njit(nogil=True)
 def work_rows(rows):
-    """Uninitialised array (rows, 8) that starts on a cache line: no vector straddles two lines."""
-    raw = np.empty((rows + 1) * LANES)
-    skip = (-(np.int64(raw.ctypes.data) >> 3)) & (LANES - 1)
+    """Uninitialised array (rows, lanes) on a cache line: no vector straddles two of them."""
+    raw = np.empty(rows * LANES + 8)
+    skip = (-(np.int64(raw.ctypes.data) >> 3)) & 7
     return raw[skip : skip + rows * LANES].reshape(rows, LANES)
 
 
 @intrinsic
 def transpose(typing_context, source, start, source_step, target, stop, target_step):
-    """Transpose 8 × 8 numbers: eight runs of eight, `step` apart, from and to flat positions."""
+    """Transpose a square of numbers: `LANES` runs, `step` apart, from and to flat positions."""
     where = (types.intp, types.intp)
     sig = types.void(source, *where, target, *where)
 
@@ -153,7 +155,7 @@ def transpose(typing_context, source, start, source_step, target, stop, target_s
             return _pointer(context, builder, sig.args[at], args[at], offset, _vector(1))
 
         rows = [builder.load(place(0, args[1], args[2], k), align=8) for k in range(LANES)]
-        for width in (1, 2, 4):  # exchange off-diagonal blocks of this width
+        for width in (1, 2, 4)[: LANES.bit_length() - 1]:  # exchange off-diagonal blocks
             low = [i + (LANES - width if i & width else 0) for i in range(LANES)]
             high = [i + (LANES if i & width else width) for i in range(LANES)]
             for k in range(LANES):
@@ -177,8 +179,8 @@ def _mask(entries):
 
 @intrinsic
 def spread(typing_context, number):
-    """Return the same number in all eight lanes."""
-    sig = float64x8(types.float64)
+    """Return the same number in all lanes."""
+    sig = float64s(types.float64)
 
     def generate(context, builder, sig, args):
         none = ir.Constant(_vector(1), ir.Undefined)
@@ -192,7 +194,7 @@ def _repeater(rows):
     @intrinsic
     def repeat_rows(typing_context, value):
         """Return the same vector in all rows of a bundle."""
-        sig = _BUNDLES[rows](float64x8)
+        sig = _BUNDLES[rows](float64s)
 
         def generate(context, builder, sig, args):
             none = ir.Constant(_vector(1), ir.Undefined)
@@ -209,7 +211,7 @@ repeat2, repeat4, repeat8 = (_repeater(rows) for rows in (2, 4, 8))
 @intrinsic(prefer_literal=True)
 def row_of(typing_context, bundle, row):
     """Return one row (a literal number) of a bundle."""
-    sig = float64x8(bundle, row)
+    sig = float64s(bundle, row)
 
     def generate(context, builder, sig, args):
         none = ir.Constant(args[0].type, ir.Undefined)
@@ -222,7 +224,7 @@ def row_of(typing_context, bundle, row):
 @intrinsic
 def stack2(typing_context, first, second):
     """Return two vectors as the rows of a bundle."""
-    sig = _BUNDLES[2](float64x8, float64x8)
+    sig = _BUNDLES[2](float64s, float64s)
 
     def generate(context, builder, sig, args):
         return builder.shuffle_vector(args[0], args[1], _mask([*range(2 * LANES)]))
@@ -260,7 +262,7 @@ smaller, larger = _function("minimum", 2), _function("maximum", 2)  # NaN if one
 @intrinsic
 def where_less(typing_context, a, b, chosen, other):
     """Lane by lane `chosen` where a < b, else `other`."""
-    sig = float64x8(float64x8, float64x8, float64x8, float64x8)
+    sig = float64s(float64s, float64s, float64s, float64s)
 
     def generate(context, builder, sig, args):
         return builder.select(builder.fcmp_ordered("<", args[0], args[1]), args[2], args[3])
@@ -271,7 +273,7 @@ def where_less(typing_context, a, b, chosen, other):
 @intrinsic
 def lanes_less(typing_context, a, b):
     """Bit k of the result tells whether a < b in lane k."""
-    sig = types.int64(float64x8, float64x8)
+    sig = types.int64(float64s, float64s)
 
     def generate(context, builder, sig, args):
         flags = builder.fcmp_ordered("<", args[0], args[1])
@@ -283,7 +285,7 @@ def lanes_less(typing_context, a, b):
 @intrinsic
 def _quarter(typing_context, shifted, sine, cosine):
     """(sin, cos) of x + nπ/2 from those of x; n sits in the lowest bits of `shifted`."""
-    sig = types.UniTuple(float64x8, 2)(float64x8, float64x8, float64x8)
+    sig = types.UniTuple(float64s, 2)(float64s, float64s, float64s)
 
     def generate(context, builder, sig, args):
         whole = _vector(1, ir.IntType(64))
@@ -308,7 +310,7 @@ def _quarter(typing_context, shifted, sine, cosine):
 
 @njit(nogil=True, fastmath={"contract"}, _nrt=False)
 def sincos(angle):
-    """Sine and cosine of eight angles, |angle| < 1e5, to about one unit in the last place.
+    """Sine and cosine of a vector of angles, |angle| < 1e5, to about one unit in the last place.
 
     Reduction by π/2 in three parts (Cody and Waite) and the minimax polynomials on [−π/4, π/4] of
     the freely distributable mathematics library FDLIBM (k_sin.c, k_cos.c). Adding 1.5 · 2⁵² rounds

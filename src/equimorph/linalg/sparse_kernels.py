@@ -1,4 +1,4 @@
-"""Compiled elimination of sparse symmetric matrices, eight lanes at a time."""
+"""Compiled elimination of sparse symmetric matrices, a vector of lanes at a time."""
 
 import numpy as np
 

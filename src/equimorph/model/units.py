@@ -32,7 +32,7 @@ UNITS: dict[str, Unit] = {
     **{name: (value, (1, -1, -2)) for name, value in {
         "Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "GPa": 1e9, "psi": POUND * STANDARD_GRAVITY / INCH**2,
     }.items()},
-    "J": (1.0, (1, 2, -2)),
+    **{name: (value, (1, 2, -2)) for name, value in {"J": 1.0, "mJ": 1e-3, "kJ": 1e3}.items()},
     "1": (1.0, (0, 0, 0)),
 }  # fmt: skip
 """Values in SI."""

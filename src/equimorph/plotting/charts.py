@@ -108,7 +108,7 @@ def parameterisation(
     rows = rows_of([len(own) for own in leaves])
     columns = max(column + len(own) for (_, column), own in zip(rows, leaves, strict=True))
     size = (_WIDTH * columns + 0.2, (_ABOVE + _BELOW) * (1 + rows[-1][0]) + _LEGEND + 0.2)
-    figure = style.attach_canvas(Figure(figsize=size))
+    figure = style.Picture(*size)
     with style.house_style({"hatch.linewidth": 0.4}):
         for number, ((row, column), own) in enumerate(zip(rows, leaves, strict=True)):
             left = _WIDTH * column

@@ -4,7 +4,6 @@ Triangles may cross each other; every pixel decides for itself, so no order of d
 Solids are seen from a `Viewpoint`, which turns what lies in space into a plane.
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -16,6 +15,7 @@ from mpl_toolkits.mplot3d import proj3d
 from equimorph.array_types import Bool, Float, Int
 from equimorph.model import Actuator, Drawing, Forces, Support
 from equimorph.plotting import style
+from equimorph.plotting.raster_kernels import nearest
 from equimorph.structures import Structure
 
 
@@ -57,11 +57,8 @@ def view_of(axes: Any) -> View:
 
 Corners = Float[np.ndarray, "cells 3 3"]
 
-_BATCH = 1_000_000
-"""Pixels that are written at a time: this bounds the memory."""
 _LEVELS = 2.0**31 - 1
 """Number of different depths in the buffer: positive 32-bit integers."""
-_EMPTY = np.iinfo(np.int64).max
 _AROUND = 2
 """Half width, in pixels, of the square around a point in which one pixel that does not hide it
 makes it visible: a curve runs along edges of the surface, and one visible side is enough."""
@@ -117,60 +114,15 @@ def depth_buffer(corners: Corners, rows: int, columns: int) -> DepthBuffer:
     rows, columns
         Size of the picture; everything outside is clipped.
     """
-    key = np.full(rows * columns, _EMPTY)
     low, high = (f(corners[..., 2], initial=0.0) for f in (np.min, np.max))
     step = max(high - low, np.finfo(float).tiny) / _LEVELS
-    for cell, row, first, last in _spans(corners, rows, columns):
-        count = last - first
-        owner, line = np.repeat(cell, count), np.repeat(row, count)
-        column = np.arange(len(owner)) + np.repeat(first - np.cumsum(count) + count, count)
-        depth = _depth_on(corners, owner, column + 0.5, line + 0.5)
-        level = ((depth - low) / step).astype(np.int64)
-        # Depth in the upper bits, triangle in the lower: the smallest key is the nearest triangle.
-        np.minimum.at(key, line * columns + column, (level << 32) | owner)
-    seen = key != _EMPTY
-    owner = np.where(seen, key & 0xFFFFFFFF, -1)
-    depth = np.where(seen, low + step * (key >> 32), np.inf)
-    return DepthBuffer(owner.reshape(rows, columns), depth.reshape(rows, columns))
-
-
-_Span = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
-
-
-def _spans(corners: Corners, rows: int, columns: int) -> Iterator[_Span]:
-    """Runs of pixels in one row inside one triangle: triangle, row, first and last-plus-one column.
-
-    They come in batches of about `_BATCH` pixels.
-    """
-    order = np.argsort(corners[..., 1], axis=1, kind="stable")
-    a, b, c = (corners[np.arange(len(corners)), order[:, k]] for k in range(3))
-    first = np.clip(np.ceil(a[:, 1] - 0.5), 0, rows).astype(int)
-    count = np.maximum(np.clip(np.ceil(c[:, 1] - 0.5), 0, rows).astype(int) - first, 0)
-    cell = np.repeat(np.arange(len(corners)), count)
-    row = np.arange(len(cell)) + np.repeat(first - np.cumsum(count) + count, count)
-    y = row + 0.5
-    lower = y < b[cell, 1]
-    start, end = (
-        np.where(lower[:, None], a[cell], b[cell]),
-        np.where(lower[:, None], b[cell], c[cell]),
-    )
-    one, other = _at_height(a[cell], c[cell], y), _at_height(start, end, y)
-    left = np.clip(np.ceil(np.minimum(one, other) - 0.5), 0, columns).astype(int)
-    right = np.clip(np.ceil(np.maximum(one, other) - 0.5), 0, columns).astype(int)
-    full = np.flatnonzero(right > left)
-    cell, row, left, right = cell[full], row[full], left[full], right[full]
-    cuts = np.searchsorted(np.cumsum(right - left), np.arange(_BATCH, (right - left).sum(), _BATCH))
-    for part in np.split(np.arange(len(cell)), cuts):
-        yield cell[part], row[part], left[part], right[part]
-
-
-def _at_height(
-    start: Float[np.ndarray, "n 3"], end: Float[np.ndarray, "n 3"], y: Float[np.ndarray, " n"]
-) -> Float[np.ndarray, " n"]:
-    """Where edges cross a row."""
-    rise = end[:, 1] - start[:, 1]
-    share = np.clip((y - start[:, 1]) / np.where(rise > 0, rise, 1.0), 0.0, 1.0)
-    return np.asarray(start[:, 0] + share * (end[:, 0] - start[:, 0]))
+    downward = np.argsort(corners[..., 1], axis=1, kind="stable")
+    ordered = np.take_along_axis(np.asarray(corners, float), downward[..., None], axis=1)
+    owner = np.full((rows, columns), -1)
+    level = np.full((rows, columns), np.iinfo(np.int64).max)
+    steep = np.ascontiguousarray(slopes(ordered, ordered[..., 2]))
+    nearest(ordered, steep, float(low), float(step), owner, level)
+    return DepthBuffer(owner, np.where(owner >= 0, low + step * level, np.inf))
 
 
 def slopes(
@@ -186,20 +138,6 @@ def slopes(
     inverse = np.array([[v[:, 1], -u[:, 1]], [-v[:, 0], u[:, 0]]]) * scale
     change = values[:, 1:] - values[:, :1]
     return np.asarray(np.einsum("dkc,ck...->cd...", inverse, change))
-
-
-def _depth_on(
-    corners: Corners,
-    cell: Int[np.ndarray, " n"],
-    x: Float[np.ndarray, " n"],
-    y: Float[np.ndarray, " n"],
-) -> Float[np.ndarray, " n"]:
-    """Depth of triangles at places, never beyond their corners (those seen edge-on are steep)."""
-    z = corners[..., 2]
-    steep = slopes(corners, z)
-    right, up = x - corners[cell, 0, 0], y - corners[cell, 0, 1]
-    depth = z[cell, 0] + steep[cell, 0] * right + steep[cell, 1] * up
-    return np.asarray(np.clip(depth, z.min(axis=1)[cell], z.max(axis=1)[cell]))
 
 
 _AZIMUTH, _ELEVATION = np.deg2rad(28.0), np.deg2rad(22.0)

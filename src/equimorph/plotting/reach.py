@@ -164,7 +164,7 @@ def reach_panels(reach: Reach, motion: Tracking) -> Figure:
     """
     _check(reach)
     width = style.DOUBLE_COLUMN
-    figure = style.attach_canvas(Figure(figsize=(width, _HEIGHT)))
+    figure = style.Picture(width, _HEIGHT)
     with style.house_style():
         places = [(0.075, 0.58, 0.385, 0.385), (0.075, 0.115, 0.385, 0.385)]
         image, plane = (figure.add_axes(place) for place in places)

@@ -50,7 +50,7 @@ def deviation_over_time(
     """
     with style.house_style():
         if ax is None:
-            figure = style.attach_canvas(Figure(figsize=(style.SINGLE_COLUMN, 2.2)))
+            figure = style.Picture(style.SINGLE_COLUMN, 2.2)
             ax = figure.add_axes((0.17, 0.19, 0.79, 0.69))
         floor = _SMALLEST * played.largest_deviation
         parts = (

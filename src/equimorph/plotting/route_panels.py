@@ -67,7 +67,7 @@ def route_panels(
     """
     if route.path is None or route.schedule is None:
         raise InputError(f"`route` must have arrived; got one that was refused: {route.why}")
-    figure = style.attach_canvas(Figure(figsize=(style.DOUBLE_COLUMN, _HEIGHT)))
+    figure = style.Picture(style.DOUBLE_COLUMN, _HEIGHT)
     with style.house_style():
         solid: Any = figure.add_axes(_SOLID, projection="3d")
         plane, shapes = figure.add_axes(_PLANE), figure.add_axes(_SHAPES)

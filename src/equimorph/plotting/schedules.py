@@ -192,7 +192,7 @@ def schedule_strips(schedule: Schedule) -> Figure:
         raise InputError("`schedule` must move a parameter; got one that moves none.")
     groups = [list(each) for _, each in groupby(strips, key=lambda k: _family(schedule, k))]
     height = _BOTTOM + _TOP + len(strips) * (_STRIP + _BETWEEN) + (len(groups) - 1) * _GROUPS
-    figure = style.attach_canvas(Figure(figsize=(style.SINGLE_COLUMN, height)))
+    figure = style.Picture(style.SINGLE_COLUMN, height)
     width = 1.0 - (_LEFT + _RIGHT) / style.SINGLE_COLUMN
     top = height - _TOP
     with style.house_style():

@@ -61,7 +61,7 @@ def snap_panels(graph: SnapGraph, descriptor: Descriptor | None = None) -> Figur
     check_two_parameters(eset, "graph")
     if not graph.snaps:
         raise InputError("`graph` must have a stability boundary; got a set without one.")
-    figure = style.attach_canvas(Figure(figsize=(style.DOUBLE_COLUMN, _HEIGHT)))
+    figure = style.Picture(style.DOUBLE_COLUMN, _HEIGHT)
     most = max(snap.released[1] for snap in graph.snaps)
     shades = ScalarMappable(Normalize(0.0, most or 1.0), style.progress_map())
     with style.house_style():

@@ -8,6 +8,7 @@ colour-blind (blue, orange and yellow after Okabe and Ito).
 
 from collections.abc import Generator, Mapping, Sequence
 from contextlib import contextmanager
+from io import BytesIO
 from itertools import pairwise
 from pathlib import Path as FilePath
 from typing import Any
@@ -37,6 +38,8 @@ SINGLE_COLUMN = 89 * MILLIMETRE
 DOUBLE_COLUMN = 183 * MILLIMETRE
 RESOLUTION = 200
 """Pixels per inch of saved pictures."""
+SCREEN = 140
+"""Pixels per inch of pictures in a notebook."""
 
 INK = "#1a1a1a"
 FAINT = "#8c8c8c"
@@ -116,6 +119,26 @@ def house_style(changes: Mapping[str, Any] | None = None) -> Generator[None]:
         yield
 
 
+class Picture(Figure):
+    """A figure that needs no screen; notebooks show it, and any of its axes, at the prompt."""
+
+    def __init__(self, width: float, height: float) -> None:
+        super().__init__(figsize=(width, height))
+        FigureCanvasAgg(self)
+        self.add_axobserver(_show_axes)
+
+    def _repr_png_(self) -> bytes:
+        file = BytesIO()
+        with house_style():
+            self.savefig(file, format="png", dpi=SCREEN, bbox_inches=whole_figure(self))
+        return file.getvalue()
+
+
+def _show_axes(figure: Any) -> None:
+    for ax in figure.axes:
+        ax._repr_png_ = figure._repr_png_
+
+
 def new_axes(width: float, height: float, room: tuple[float, float, float, float]) -> Axes:
     """One empty axes on a new figure.
 
@@ -133,7 +156,7 @@ def new_axes(width: float, height: float, room: tuple[float, float, float, float
     -------
     The axes; its figure is ``axes.figure``.
     """
-    figure = attach_canvas(Figure(figsize=(width, height)))
+    figure = Picture(width, height)
     left, bottom, right, top = room
     return figure.add_axes(
         (left / width, bottom / height, 1 - (left + right) / width, 1 - (bottom + top) / height)
@@ -206,12 +229,6 @@ def letter_panels(letters: str, panels: Sequence[Axes]) -> None:
     """Write bold letters in brackets above the left corners of panels."""
     for letter, ax in zip(letters, panels, strict=True):
         ax.set_title(f"({letter})", loc="left", weight="bold", pad=3)
-
-
-def attach_canvas(figure: Figure) -> Figure:
-    """Give a figure the canvas that draws without a screen."""
-    FigureCanvasAgg(figure)
-    return figure
 
 
 def few_ticks() -> MaxNLocator:

@@ -4,7 +4,6 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
@@ -149,8 +148,7 @@ def surface(
 
 def _new_axes() -> Axes:
     """Axes that fill a figure; room for the labels is inside them."""
-    figure = Figure(figsize=(0.72 * style.DOUBLE_COLUMN, 0.58 * style.DOUBLE_COLUMN))
-    style.attach_canvas(figure)
+    figure = style.Picture(0.72 * style.DOUBLE_COLUMN, 0.58 * style.DOUBLE_COLUMN)
     return figure.add_axes((-0.045, 0.03, 1.0, 0.95), projection="3d")
 
 

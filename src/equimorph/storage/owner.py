@@ -32,7 +32,7 @@ class Owner:
         InputError
             If neither the structure nor the user gives a descriptor of this name.
         """
-        return self.descriptors.get(name) or worst_named(self.structure, name)
+        return worst_named(self.structure, name, self.descriptors)
 
     def constraint(self, words: list[Any]) -> Constraint:
         """Constraint that `words_of` wrote."""

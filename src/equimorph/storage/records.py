@@ -6,7 +6,7 @@ other results of tasks are written field by field, see `values`. Every group say
 See docs/decisions.md, "Records carry a schema and a version".
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,6 +15,7 @@ import h5py
 
 from equimorph.charts import Atlas, Chart
 from equimorph.manifold import EquilibriumSet
+from equimorph.model import Descriptor
 from equimorph.storage.charts import read_chart, write_chart
 from equimorph.storage.hdf import content, get_json, open_file, put_json
 from equimorph.storage.maps import read_map_group, write_map_group
@@ -139,7 +140,9 @@ def content_of(value: Any) -> bytes:
     return content(FORMAT, VERSION, lambda file: write_record(file.create_group(RECORD), value))
 
 
-def load_record(path: Path, structure: Structure) -> Any:
+def load_record(
+    path: Path, structure: Structure, descriptors: Mapping[str, Descriptor] | None = None
+) -> Any:
     """Read the result that a file holds.
 
     Raises
@@ -148,4 +151,4 @@ def load_record(path: Path, structure: Structure) -> Any:
         If the file is missing or damaged, or holds something that this release cannot read.
     """
     with open_file(path, FORMAT, VERSION) as file:
-        return read_record(file[RECORD], Owner(structure))
+        return read_record(file[RECORD], Owner(structure, descriptors or {}))

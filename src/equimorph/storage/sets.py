@@ -227,7 +227,7 @@ def link_grid(file: h5py.File, group: h5py.Group, size: int) -> None:
         Corners of a cell.
     """
     grid = file.create_group("VTKHDF")
-    grid.attrs["Version"] = np.array([2, 0])
+    grid.attrs["Version"] = np.array([1, 0])  # as later ones for one grid; older readers warn
     grid.attrs["Type"] = np.bytes_("UnstructuredGrid")
     grid["Points"], grid["Connectivity"] = group["embedding"], group["connectivity"]
     points, corners = len(group["embedding"]), len(group["connectivity"])

@@ -112,7 +112,4 @@ def from_identity(identity: Mapping[str, Any]) -> Structure:
     kind = data.pop("kind", None)
     if kind not in KINDS:
         raise InputError(f"`kind` must be one of {', '.join(KINDS)}; got {kind!r}.")
-    try:
-        return KINDS[kind](**data)
-    except TypeError as error:
-        raise InputError(f"`structure` must have the data of a {kind}; got {error}.") from None
+    return KINDS[kind](**data)

@@ -12,7 +12,7 @@ import numpy as np
 from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Lanes, Parameters, Values
 from equimorph.errors import InputError
-from equimorph.model import Box, Descriptor, position, remember_call
+from equimorph.model import Box, Descriptor, largest_of, position, remember_call
 from equimorph.model.obstacle import Disc, HalfPlane, Obstacle
 from equimorph.model.units import FORCE, LENGTH, UNITS
 from equimorph.structures.approach import nearest
@@ -30,8 +30,8 @@ EFFORTS = {
 """Symbols of efforts by unit: couples M, forces F, and the travel δ of forces, which they lose."""
 
 GENERIC = (
-    *("a parameter", "effort(parameter)", "stability_margin", "abs(…)", "distance(…)"),
-    *("outside(…)", "shape_x(s)", "shape_y(s)"),
+    *("a parameter", "effort(parameter)", "stability_margin", "abs(…)", "largest(…, …)"),
+    *("distance(…)", "outside(…)", "shape_x(s)", "shape_y(s)"),
 )
 """What texts may mean of every structure, for messages."""
 
@@ -171,6 +171,8 @@ def outside(structure: Structure, box: Box) -> Descriptor:
 
 
 _CALL = re.compile(r"\s*(\w+)\((.*)\)\s*", re.DOTALL)
+_COMMA = re.compile(r",(?![^(]*\))")
+"""Between texts, not inside their brackets."""
 _RANGE = re.compile(r"\s*(\w+)\s+(\S+)\s+to\s+(\S+)\s*")
 
 
@@ -178,8 +180,8 @@ def find_descriptor(structure: Structure, text: str) -> Descriptor:
     """Descriptor that a text means.
 
     Beside those of the structure: ``Theta`` (any parameter), ``effort(Theta)``,
-    ``abs(effort(Theta))``, ``stability_margin``, ``distance(half_plane(x, y, nx, ny))``,
-    ``distance(disc(x, y, r))``,
+    ``abs(effort(Theta))``, ``largest(abs(end_moment(0)), abs(end_moment(1)))`` of several,
+    ``stability_margin``, ``distance(half_plane(x, y, nx, ny))``, ``distance(disc(x, y, r))``,
     ``distance(room(x, y, r))``, ``outside(Theta 1 to 2, Delta 0 to 1)`` and, of the drawn shape,
     ``shape_y(0.3)``.
 
@@ -218,6 +220,11 @@ def _effort(structure: Structure, inner: str) -> Descriptor:
 
 def _absolute(structure: Structure, inner: str) -> Descriptor:
     return abs(find_descriptor(structure, inner))
+
+
+def _largest(structure: Structure, inner: str) -> Descriptor:
+    parts = [find_descriptor(structure, part) for part in _COMMA.split(inner)]
+    return largest_of(f"largest({', '.join(each.name for each in parts)})", *parts)
 
 
 def _distance(structure: Structure, inner: str) -> Descriptor:
@@ -266,6 +273,7 @@ def _shape(axis: str, structure: Structure, inner: str) -> Descriptor:
 _FORMS: dict[str, Callable[[Structure, str], Descriptor]] = {
     "abs": _absolute,
     "effort": _effort,
+    "largest": _largest,
     "distance": _distance,
     "outside": _outside,
     "shape_x": partial(_shape, "x"),

@@ -128,7 +128,7 @@ class DescriptorArgument(Argument):
 
     def interpret(self, ground: Ground, value: str, key: str) -> Any:
         """Look it up."""
-        return descriptor_at(ground.structure, value, key)
+        return descriptor_at(ground, value, key)
 
 
 class DescriptorsArgument(Argument):
@@ -137,7 +137,7 @@ class DescriptorsArgument(Argument):
     def interpret(self, ground: Ground, value: Sequence[str], key: str) -> Any:
         """Look them up."""
         texts = enumerate(value)
-        return tuple(descriptor_at(ground.structure, text, f"{key}[{i}]") for i, text in texts)
+        return tuple(descriptor_at(ground, text, f"{key}[{i}]") for i, text in texts)
 
 
 class CoordinatesArgument(Argument):
@@ -147,7 +147,7 @@ class CoordinatesArgument(Argument):
         """Look the descriptors up."""
         names = names_of(ground.structure.parameters)
         return tuple(
-            text if text in names else descriptor_at(ground.structure, text, f"{key}[{i}]")
+            text if text in names else descriptor_at(ground, text, f"{key}[{i}]")
             for i, text in enumerate(value)
         )
 
@@ -157,7 +157,7 @@ class ValuesArgument(Argument):
 
     def interpret(self, ground: Ground, value: Mapping[str, float], key: str) -> Any:
         """Look the descriptors up."""
-        return descriptors_of(ground.structure, value, key)
+        return descriptors_of(ground, value, key)
 
 
 class WithinArgument(Argument):
@@ -165,7 +165,7 @@ class WithinArgument(Argument):
 
     def interpret(self, ground: Ground, value: Sequence[str], key: str) -> Any:
         """Look their descriptors up."""
-        return constraints_of(ground.structure, value, key)
+        return constraints_of(ground, value, key)
 
 
 class ParametersArgument(Argument):
@@ -215,7 +215,7 @@ class LegsArgument(Argument):
         names = names_of(ground.structure.parameters)
         return [
             {
-                (text if text in names else descriptor_at(ground.structure, text, f"{key}[{i}]")): x
+                (text if text in names else descriptor_at(ground, text, f"{key}[{i}]")): x
                 for text, x in leg.items()
             }
             for i, leg in enumerate(value)

@@ -6,7 +6,6 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator, Field, WithJsonSchema
 
-from equimorph.equilibria import worst_named
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Grid, Rates, Schedule, position
@@ -22,6 +21,7 @@ from equimorph.study.lookup import (
     check_point,
     check_value,
     check_values,
+    descriptor_at,
 )
 from equimorph.study.states import StateSection
 from equimorph.tasks.maps.actuator_map import unloaded_base
@@ -118,9 +118,8 @@ class ObjectiveArgument(Argument):
         check_parameters(ground.structure, section.rates or (), f"{place}.rates")
         given = getattr(section, self.key)
         if isinstance(given, str) and (extreme := EXTREME.fullmatch(given)):
-            with at_key(f"{place}.{self.key}"):
-                descriptor = worst_named(ground.structure, extreme["descriptor"])
-                return peak(descriptor) if extreme["which"] == "peak" else least(descriptor)
+            descriptor = descriptor_at(ground, extreme["descriptor"], f"{place}.{self.key}")
+            return peak(descriptor) if extreme["which"] == "peak" else least(descriptor)
         terms = _terms(given)
         return [
             (weight, Rates(section.rates or {}) if name == "time" else name)

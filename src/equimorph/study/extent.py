@@ -12,7 +12,7 @@ from equimorph.model import Box, Constraint, parameter_vector
 from equimorph.structures import Structure
 from equimorph.study.complaint import Findings
 from equimorph.study.fields import ComparisonText, Count, Interval, Point, Section, requirement
-from equimorph.study.lookup import Extent, at_key, check_value, constraints_of
+from equimorph.study.lookup import Extent, Ground, at_key, check_value, constraints_of
 from equimorph.study.signatures import arguments_of
 
 WRITTEN = ("box", "fixed", "within", "intervals")
@@ -96,7 +96,7 @@ def _intervals(wanted: Any) -> tuple[int, ...]:
 
 def _bounds(structure: Structure, texts: Sequence[str]) -> tuple[Constraint, ...]:
     """Constraints of the set; structures with equilibria without end need a bound."""
-    constraints = constraints_of(structure, texts, "set.within")
+    constraints = constraints_of(Ground(structure, None), texts, "set.within")
     if missing := structure.missing_bound(constraints):
         told = ", ".join(texts) or "nothing"
         raise InputError(

@@ -5,6 +5,7 @@ descriptor, the bound is a number.
 """
 
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Any, Literal, cast
 
@@ -13,7 +14,7 @@ from pydantic_core import PydanticCustomError
 
 from equimorph.equilibria import worst_named
 from equimorph.errors import InputError
-from equimorph.model import Constraint
+from equimorph.model import Constraint, Descriptor
 from equimorph.structures import Structure
 
 LARGEST = 1e9
@@ -33,9 +34,9 @@ class Comparison:
     bound: float
     unit: str = field(default="", repr=False)
 
-    def on(self, structure: Structure) -> Constraint:
-        """Return the same comparison with the descriptor of a structure."""
-        of = worst_named(structure, self.descriptor)
+    def on(self, structure: Structure, known: Mapping[str, Descriptor] | None = None) -> Constraint:
+        """Return the same comparison with the descriptor of a structure, or a known one."""
+        of = worst_named(structure, self.descriptor, known)
         bound = f"{self.bound!r} {self.unit}" if self.unit else self.bound
         return of <= bound if self.sense == "<=" else of >= bound
 

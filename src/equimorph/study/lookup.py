@@ -4,19 +4,23 @@ from abc import ABC, abstractmethod
 from collections.abc import Generator, Iterable, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from pydantic import model_validator
 
 from equimorph import charts
+from equimorph.arrays import Lanes, Parameters, Values
 from equimorph.equilibria import worst_named
 from equimorph.errors import InputError
-from equimorph.manifold import EquilibriumSet
+from equimorph.manifold import EquilibriumSet, SetBarriers, barriers
 from equimorph.model import Box, Constraint, Descriptor, position
 from equimorph.structures import Structure
 from equimorph.study.fields import Positive, Section, parse_comparison, requirement
 
+BARRIER = "barrier"
+"""Name of the descriptor of energy barriers over the set."""
 LARGEST_ANGLE = 20.0
 """Radians; ends turned further against each other need curvatures above 40 everywhere."""
 
@@ -40,6 +44,8 @@ class Ground:
     structure: Structure
     extent: Extent | None
     """Of the set, if the study has one."""
+    eset: EquilibriumSet | None = None
+    """The set, as soon as it is there."""
 
     @property
     def height(self) -> Descriptor:
@@ -51,6 +57,23 @@ class Ground:
         """Box of the set, which there is where a question needs it."""
         assert self.extent is not None
         return self.extent.box
+
+    @cached_property
+    def field(self) -> SetBarriers:
+        """Energy barriers over the set, computed when they are first asked for."""
+        assert self.eset is not None
+        return barriers(self.eset)
+
+    @cached_property
+    def descriptors(self) -> Mapping[str, Descriptor]:
+        """What the set tells of its states, by name."""
+        if self.extent is None:
+            return {}
+        unit = self.structure.descriptor("energy").unit
+        return {BARRIER: Descriptor(BARRIER, unit, self._barrier, "ΔE", self.structure.signature)}
+
+    def _barrier(self, z: Lanes, p: Parameters) -> Values:
+        return self.field.descriptor.function(z, p)
 
 
 class Later(ABC):
@@ -124,26 +147,26 @@ def check_parameters(structure: Structure, names: Iterable[str], key: str) -> No
             position(structure.parameters, name)
 
 
-def constraints_of(structure: Structure, texts: Sequence[str], key: str) -> tuple[Constraint, ...]:
+def constraints_of(ground: Ground, texts: Sequence[str], key: str) -> tuple[Constraint, ...]:
     """Look up comparisons; `InputError` names the key of one that means nothing."""
     constraints = []
     for i, text in enumerate(texts):
         with at_key(f"{key}[{i}]"):
-            constraints.append(parse_comparison(text).on(structure))
+            constraints.append(parse_comparison(text).on(ground.structure, ground.descriptors))
     return tuple(constraints)
 
 
-def descriptor_at(structure: Structure, text: str, key: str) -> Descriptor:
+def descriptor_at(ground: Ground, text: str, key: str) -> Descriptor:
     """Look up a descriptor; `InputError` names the key if it means nothing."""
     with at_key(key):
-        return worst_named(structure, text)
+        return worst_named(ground.structure, text, ground.descriptors)
 
 
 def descriptors_of(
-    structure: Structure, values: Mapping[str, float], key: str
+    ground: Ground, values: Mapping[str, float], key: str
 ) -> dict[Descriptor, float]:
     """Look up the descriptors of values."""
-    return {descriptor_at(structure, text, key): value for text, value in values.items()}
+    return {descriptor_at(ground, text, key): value for text, value in values.items()}
 
 
 class RuleSection(Section):
@@ -174,9 +197,9 @@ def rule_of(ground: Ground, section: RuleSection, key: str) -> charts.Rule:
         For a descriptor or parameter that the structure does not have.
     """
     if section.highest is not None:
-        return charts.highest(descriptor_at(ground.structure, section.highest, f"{key}.highest"))
+        return charts.highest(descriptor_at(ground, section.highest, f"{key}.highest"))
     if section.lowest is not None:
-        return charts.lowest(descriptor_at(ground.structure, section.lowest, f"{key}.lowest"))
+        return charts.lowest(descriptor_at(ground, section.lowest, f"{key}.lowest"))
     if section.quasi_static is not None:
         check_parameters(ground.structure, [section.quasi_static], f"{key}.quasi_static")
         return charts.quasi_static(section.quasi_static)

@@ -1,7 +1,7 @@
 """From a study file to the objects of the library; errors name the key."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from equimorph.manifold import EquilibriumSet
@@ -28,6 +28,12 @@ class Problem:
     def structure(self) -> Structure:
         """Of the whole study."""
         return self.ground.structure
+
+    def on(self, eset: EquilibriumSet) -> "Problem":
+        """The same with what its texts mean of the states of the set."""
+        ground = replace(self.ground, eset=eset)
+        looked_up = (each.kind.look_up(ground, each.section, each.key) for each in self.questions)
+        return replace(self, ground=ground, questions=tuple(looked_up))
 
     @property
     def extents(self) -> Mapping[str, Extent]:

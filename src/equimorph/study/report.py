@@ -85,7 +85,7 @@ def _explorer(outcome: Outcome, eset: EquilibriumSet) -> list[Figure]:
 
     def draw(folder: Path) -> None:
         explore(
-            eset,
+            outcome.problem.ground.field if outcome.of("barriers") else eset,
             routes,
             folder / EXPLORER,
             title=outcome.study.title,

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from importlib.metadata import version
 from pathlib import Path
@@ -15,7 +15,7 @@ from equimorph.argument_checks import check_arguments
 from equimorph.errors import InputError
 from equimorph.logs import log_of
 from equimorph.manifold import EquilibriumSet, equilibrium_set
-from equimorph.model import Progress, Silent, Workers
+from equimorph.model import Descriptor, Progress, Silent, Workers
 from equimorph.storage import write_results
 from equimorph.storage.files import checksum, fingerprint, link_file, move_whole, read_text
 from equimorph.storage.records import content_of, load_record
@@ -48,6 +48,8 @@ class Checkpoints:
         The results folder, open.
     structure
         To which the answers belong.
+    descriptors
+        Beside those of the structure, by name.
     asked
         Fingerprints of the questions of this run so far.
     found
@@ -56,6 +58,7 @@ class Checkpoints:
 
     results: ResultsFolder
     structure: Structure
+    descriptors: Mapping[str, Descriptor] = field(default_factory=dict)
     asked: set[str] = field(default_factory=set)
     found: set[str] = field(default_factory=set)
 
@@ -88,7 +91,7 @@ class Checkpoints:
                 return cast(Answer, kept)
             file.unlink()
         file = self._store(key, content_of(compute()))
-        return cast(Answer, load_record(file, self.structure))
+        return cast(Answer, load_record(file, self.structure, self.descriptors))
 
     def forget_others(self) -> None:
         """Remove answers to questions that this run did not ask."""
@@ -109,7 +112,7 @@ class Checkpoints:
         if not file.name.endswith(checksum(file.read_bytes())):
             return None
         try:
-            return (load_record(file, self.structure),)
+            return (load_record(file, self.structure, self.descriptors),)
         except InputError:
             return None
 
@@ -242,6 +245,8 @@ def solve(
         with _measure_time(seconds, "equilibrium set"):
             eset = _equilibrium_set(study, ground, ground.extent, checkpoints, progress)
         reused = bool(checkpoints.found)
+        problem = problem.on(eset)
+        checkpoints = replace(checkpoints, descriptors=problem.ground.descriptors)
         with _measure_time(seconds, "equilibria"):
             points = tuple(_equilibria(study, eset, at, checkpoints) for at in problem.points)
     answers = []

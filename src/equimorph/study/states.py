@@ -7,7 +7,7 @@ import numpy as np
 from pydantic import AfterValidator, Field, model_validator
 
 from equimorph.arrays import Values
-from equimorph.equilibria import lift, worst_named
+from equimorph.equilibria import lift
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import names_of, parameter_vector
@@ -58,9 +58,8 @@ class ChosenState(Later):
 
     def on(self, ground: Ground, eset: EquilibriumSet | None) -> State:
         """State on the set of the study."""
-        del ground
         assert eset is not None
-        return choose_state(eset, self.section, self.key)
+        return choose_state(ground, eset, self.section, self.key)
 
 
 @dataclass(frozen=True)
@@ -81,7 +80,7 @@ def check_state(ground: Ground, section: StateSection, key: str) -> None:
     check_point(ground.box, section.at, f"{key}.at")
     for text in (section.highest, section.lowest, *(section.near or ())):
         if text is not None:
-            descriptor_at(ground.structure, text, key)
+            descriptor_at(ground, text, key)
 
 
 def check_natural(ground: Ground, given: NaturalSection, key: str) -> None:
@@ -100,11 +99,13 @@ def check_natural(ground: Ground, given: NaturalSection, key: str) -> None:
         parameter_vector(structure.parameters, {**given.at, **structure.unloaded()})
 
 
-def choose_state(eset: EquilibriumSet, section: StateSection, key: str) -> State:
+def choose_state(ground: Ground, eset: EquilibriumSet, section: StateSection, key: str) -> State:
     """Return the stable equilibrium that a section of a study describes.
 
     Parameters
     ----------
+    ground
+        What the descriptors mean by which it is chosen.
     eset
         The equilibrium set.
     section
@@ -125,12 +126,12 @@ def choose_state(eset: EquilibriumSet, section: StateSection, key: str) -> State
             f"at {_point(section.at)}."
         )
     if section.near is not None:
-        return _nearest(here, section.near, key)
+        return _nearest(ground, here, section.near, key)
     if section.highest is not None:
-        values = worst_named(eset.structure, section.highest)(stable)
+        values = descriptor_at(ground, section.highest, key)(stable)
         return stable[int(np.argmax(values))]
     if section.lowest is not None:
-        values = worst_named(eset.structure, section.lowest)(stable)
+        values = descriptor_at(ground, section.lowest, key)(stable)
         return stable[int(np.argmin(values))]
     if len(stable) > 1:
         raise InputError(
@@ -140,9 +141,9 @@ def choose_state(eset: EquilibriumSet, section: StateSection, key: str) -> State
     return stable[0]
 
 
-def _nearest(here: States, near: dict[str, float], key: str) -> State:
+def _nearest(ground: Ground, here: States, near: dict[str, float], key: str) -> State:
     ((text, wanted),) = near.items()
-    values: Values = worst_named(here.structure, text)(here)
+    values: Values = descriptor_at(ground, text, key)(here)
     best = int(np.argmin(np.abs(values - wanted)))
     state = here[best]
     if abs(values[best] - wanted) > AGREEMENT:

@@ -5,7 +5,7 @@ See docs/decisions.md, "Folds and constraints are built into the cells".
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import cache, lru_cache
 
 import numpy as np
 
@@ -50,37 +50,32 @@ def match_folds(
     if len(folds) % 2 or any(arc is None for arc in arcs):
         return []
     kinds = {point: singular(point) for point in folds}
-    ways = _matchings(folds, [arc or 0 for arc in arcs], kinds)
-    found = {frozenset(chords) for chords in ways}
-    return [sorted(chords) for chords in sorted(found, key=sorted)]
+    return sorted(sorted(way) for way in _matchings(folds, [arc or 0 for arc in arcs], kinds))
 
 
 def _matchings(folds: list[int], arcs: list[int], kinds: dict[int, int]) -> list[list[Chord]]:
     """Chords for folds in a circle; arcs[k] is the index between folds k and k + 1.
 
-    A set of chords that do not cross always joins two neighbours; the arc between them becomes a
-    piece, and the arcs on both sides merge, so that they must have the same index.
+    The first of some folds side by side is joined with another one; what lies inside this chord
+    and what lies behind it are matched separately, each arc of a piece with the same index.
     """
 
     def fits(a: int, b: int, inside: int, outside: int) -> bool:
         return kinds[a] == kinds[b] and (kinds[a] == MEETING or inside != outside)
 
-    if len(folds) == 2:
-        low, high = sorted(folds)
-        return [[(low, high)]] if fits(low, high, *arcs) else []
-    found: list[list[Chord]] = []
-    count = len(folds)
-    for k in range(count):
-        after, before = (k + 1) % count, (k - 1) % count
-        if arcs[before] != arcs[after] or not fits(folds[k], folds[after], arcs[k], arcs[after]):
-            continue
-        keep = [i for i in range(count) if i not in {k, after}]
-        # fold `before` is now followed by the merged arc; the arcs of k and of `after` are gone
-        rest_folds, rest_arcs = [folds[i] for i in keep], [arcs[i] for i in keep]
-        low, high = sorted((folds[k], folds[after]))
-        rest_ways = _matchings(rest_folds, rest_arcs, kinds)
-        found.extend([(low, high), *rest] for rest in rest_ways)
-    return found
+    @cache
+    def ways(first: int, end: int, outside: int) -> list[list[Chord]]:
+        if first == end:
+            return [[]]
+        inside, found = arcs[first], list[list[Chord]]()
+        for k in range(first + 1, end, 2):
+            one, other = sorted((folds[first], folds[k]))
+            if arcs[k - 1] == inside and arcs[k] == outside and fits(one, other, inside, outside):
+                within, behind = ways(first + 1, k, inside), ways(k + 1, end, outside)
+                found += [[(one, other), *a, *b] for a in within for b in behind]
+        return found
+
+    return ways(0, len(folds), arcs[-1])
 
 
 def cut(polygon: Sequence[int], chords: Sequence[Chord], middle: dict[Chord, int]) -> list[Piece]:

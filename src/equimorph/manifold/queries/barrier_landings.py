@@ -9,7 +9,7 @@ from itertools import combinations
 import numpy as np
 
 from equimorph.array_types import Float, Int
-from equimorph.arrays import Flags, Lanes, Some
+from equimorph.arrays import Flags, Lanes, Numbers, Parameters, Some
 from equimorph.equilibria.descents import descend
 from equimorph.equilibria.gradient_flow import FAITHFUL, Ending
 from equimorph.equilibria.soft_modes import metric_length
@@ -61,6 +61,33 @@ def landings_of(eset: EquilibriumSet, progress: Progress) -> Landings:
     corners = corners.reshape(len(some), -1)
     p = points.p[eset.cells[some]]
     return _of_cells(structure, row, p, ends[corners], code[corners])
+
+
+def over_parameters(eset: EquilibriumSet, p: Parameters) -> StatesOver:
+    """States of a set over rows of all parameters."""
+    return eset.over(**dict(zip(eset.names, p[:, eset.setting.free].T.copy(), strict=True)))
+
+
+@dataclass(frozen=True)
+class SaddleLandings:
+    """Vertices of index one, and the cells on which descents from them end, −1 where none is known.
+
+    The two sides stand in no order.
+    """
+
+    vertices: Numbers
+    cells: Int[np.ndarray, "vertices 2"]
+
+
+def cells_of_landings(eset: EquilibriumSet, landings: Landings) -> SaddleLandings:
+    """Cells of the set on which descents from its vertices of index one end."""
+    corners = eset.cells[landings.row >= 0]
+    vertices, first = np.unique(corners, return_index=True)
+    ends = landings.ends.reshape(-1, *landings.ends.shape[2:])[first]
+    over = over_parameters(eset, eset.points.p[vertices])
+    sides = [[_known(over, k, z) for z in pair] for k, pair in enumerate(ends)]
+    number = np.array(sides, int).reshape(-1, 2)
+    return SaddleLandings(vertices, np.where(number >= 0, over.cell[number], NONE))
 
 
 def _of_cells(

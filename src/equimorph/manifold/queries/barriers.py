@@ -27,8 +27,11 @@ from equimorph.manifold.queries.barrier_landings import (
     NONE,
     Ends,
     Landings,
+    SaddleLandings,
+    cells_of_landings,
     ends_of_descents,
     landings_of,
+    over_parameters,
 )
 from equimorph.model import Descriptor, Progress, Silent
 from equimorph.structures import States
@@ -186,6 +189,11 @@ class SetBarriers:
         return values.reshape(count, count)
 
     @cached_property
+    def saddle_landings(self) -> SaddleLandings:
+        """Cells of the set on which descents from its vertices of index one end."""
+        return cells_of_landings(self.eset, self.landings)
+
+    @cached_property
     def _numbers(self) -> dict[bytes, int]:
         """Numbers of the vertices by their parameters and unknowns, bit for bit."""
         rows = np.concatenate([self.eset.points.p, self.eset.points.z], axis=1)
@@ -229,8 +237,7 @@ class SetBarriers:
     def _of(self, z: Lanes, p: Parameters, *, exact: bool) -> Barriers:
         """Barriers; if not exact, a lower bound where it is not certain where saddles lead."""
         eset, structure = self.eset, self.eset.structure
-        columns = dict(zip(eset.names, p[:, eset.setting.free].T.copy(), strict=True))
-        over = eset.over(**columns)
+        over = over_parameters(eset, p)
         energy, stable = over.states.energy, over.index == 0
         ways = self.ways(over, exact=exact)
         exits = np.full((len(energy), 2), NONE)

@@ -4,10 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from equimorph.array_types import Float
+from equimorph.array_types import Float, Int
 from equimorph.arrays import Flags, Items, Lanes, Pairs, Parameters, Rows, Some
 from equimorph.columns import Columns
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
+from equimorph.manifold.complex.kept_sets import kept
 from equimorph.manifold.geometry.exact_points import Aim, correct_points
 from equimorph.manifold.geometry.setting import Setting, embed
 from equimorph.manifold.geometry.tangents import (
@@ -38,9 +39,26 @@ class SetPoints(Columns):
         return len(self.z)
 
 
+@kept
+def _corners(
+    eset: EquilibriumSet,
+) -> tuple[Int[np.ndarray, " corners"], Int[np.ndarray, " starts"]]:
+    """Corners of all cells by vertex, and where those of each vertex begin."""
+    flat = eset.cells.ravel()
+    order = np.argsort(flat, kind="stable")
+    return order, np.searchsorted(flat[order], np.arange(len(eset.points) + 1))
+
+
+def cells_around(eset: EquilibriumSet, vertices: Items) -> Some:
+    """Numbers of the cells with one of a few vertices."""
+    order, begin = _corners(eset)
+    parts = [order[begin[each] : begin[each + 1]] for each in vertices.tolist()]
+    return np.unique(np.concatenate([np.zeros(0, int), *parts]) // eset.cells.shape[1])
+
+
 def points_at_vertices(eset: EquilibriumSet, vertices: Items) -> SetPoints:
     """Vertices of a set, with the planes of cells around them."""
-    around = eset.cells[np.isin(eset.cells, vertices).any(axis=1)]
+    around = eset.cells[cells_around(eset, vertices)]
     used, corners = np.unique(around, return_inverse=True)
     near = eset.points[used]
     rows = best_corners(eset.setting, near.z, near.p, corners.reshape(around.shape))

@@ -13,6 +13,7 @@ from equimorph.arrays import Flags, Lanes, Parameters, Values
 from equimorph.equilibria.soft_modes import metric_length
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.manifold.lookup.states_over import StatesOver
+from equimorph.manifold.queries.barrier_landings import over_parameters
 from equimorph.manifold.queries.barriers import SetBarriers, nearest_states
 from equimorph.manifold.queries.levels import Level, level_set, part
 from equimorph.model import Descriptor
@@ -89,7 +90,7 @@ def _ties(field: SetBarriers, index: int) -> Level:
     eset = field.eset
 
     def gap(z: Lanes, p: Parameters) -> Values:
-        return _gap(field, _over(eset, p), index, z, p)
+        return _gap(field, over_parameters(eset, p), index, z, p)
 
     unit = eset.structure.descriptor("energy").unit
     some = part(eset, eset.cell_index == index)
@@ -104,10 +105,6 @@ def _ties(field: SetBarriers, index: int) -> Level:
     used = np.unique(np.concatenate([np.zeros(0, int), *(each.ravel() for each in pieces)]))
     numbered = tuple(np.searchsorted(used, each) for each in pieces)
     return Level(found.states[used], numbered, found.lost)
-
-
-def _over(eset: EquilibriumSet, p: Parameters) -> StatesOver:
-    return eset.over(**dict(zip(eset.names, p[:, eset.setting.free].T.copy(), strict=True)))
 
 
 def _gap(field: SetBarriers, over: StatesOver, index: int, z: Lanes, p: Parameters) -> Values:
@@ -125,7 +122,7 @@ def _gap(field: SetBarriers, over: StatesOver, index: int, z: Lanes, p: Paramete
 
 def _lowest(field: SetBarriers, saddles: States) -> Flags:
     """Whether saddles are among the two lowest ways out of a minimum, and as high as the other."""
-    over = _over(field.eset, saddles.p)
+    over = over_parameters(field.eset, saddles.p)
     number, energy = nearest_states(over, saddles.z, np.zeros(len(over.index))), over.states.energy
     pairs = np.unique(field.ways(over, exact=True)[:, [1, 0]], axis=0)
     start, top = pairs[np.lexsort((energy[pairs[:, 1]], pairs[:, 0]))].T

@@ -1,4 +1,4 @@
-"""Compiled evaluation of instruction tapes, eight lanes at a time."""
+"""Compiled evaluation of instruction tapes, a vector of lanes at a time."""
 
 import math
 
@@ -80,7 +80,7 @@ def one_lane(code, a, b):  # noqa: PLR0911  # one value per operation
 
 @njit(**INNER)
 def quickly(code, a, b):  # noqa: PLR0911  # one value per operation
-    """Operations on eight lanes at once."""
+    """Operations on all lanes of a vector at once."""
     zero, one = spread(0.0), spread(1.0)
     if code == 4:
         return a + b
@@ -124,7 +124,7 @@ def quickly(code, a, b):  # noqa: PLR0911  # one value per operation
 
 @njit(**INNER)
 def run(tape, constants, x, work, result):
-    """Run a tape (operation, first, second, place): x, work and result have rows of eight lanes."""
+    """Run a tape (operation, first, second, place): x, work and result have rows of lanes."""
     for i in range(len(tape)):
         code, first, second, place = tape[i, 0], tape[i, 1], tape[i, 2], tape[i, 3]
         if code == 0:

@@ -49,8 +49,8 @@ class EnergyStructure(DiscreteStructure):
     """Structure with an energy E(u; p) and constraints c(u; p) = 0 that its author writes down.
 
     All derivatives are exact: CasADi [Andersson2019]_ forms the graphs of residual, KKT matrix, and
-    their derivatives, and they run as tapes of instructions on eight lanes at a time. The matrix is
-    kept sparse.
+    their derivatives, and they run as tapes of instructions on a vector of lanes at a time. The
+    matrix is kept sparse.
 
     Parameters
     ----------

@@ -21,8 +21,7 @@ from equimorph.model import (
     Support,
     remember_call,
 )
-from equimorph.structures.any_network import AnyNetwork
-from equimorph.structures.frame.any_model import AnyFrameModel
+from equimorph.structures.frame.strength import StressedFrame
 from equimorph.structures.network import direction_of_mechanism
 from equimorph.structures.rod.discretisation import error_by_refinement
 from equimorph.structures.vibration import MaterialPoints
@@ -59,10 +58,9 @@ class Stretch(NamedTuple):
     shares: np.ndarray
 
 
-class AnyFrame(AnyNetwork):
+class AnyFrame(StressedFrame):
     """A frame: what its model says in the units of its user, and what is drawn of it."""
 
-    model: AnyFrameModel
     stations: ClassVar[int]
     """Places along a piece at which a line load is drawn."""
     turn_of_unknowns: ClassVar[float]

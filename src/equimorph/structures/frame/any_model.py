@@ -12,6 +12,7 @@ from equimorph.argument_kinds import is_listed, is_number, one_of
 from equimorph.array_types import Bool, Float, Int
 from equimorph.errors import InputError
 from equimorph.model.units import STANDARD_GRAVITY
+from equimorph.structures.frame.member import Stiffness
 from equimorph.structures.network import Network, check_parameter_names, vector
 from equimorph.structures.rod.discretisation import Mesh, reference_element
 from equimorph.structures.unit_system import UnitSystem
@@ -21,8 +22,12 @@ WEIGHT = "weight"
 
 @dataclass(frozen=True, eq=False)
 class AnyFrameNetwork(Network):
-    """Joints in their places, the pieces of members between them, and their supports."""
+    """Joints in their places, the pieces of members between them, and their supports.
 
+    made: the stiffness of each member.
+    """
+
+    made: tuple[Stiffness, ...]
     edge: ClassVar[str] = "member"
     whole: ClassVar[str] = "frames"
     axes_of_turns: ClassVar[int]
@@ -53,20 +58,27 @@ class AnyFrameNetwork(Network):
     ) -> bool:
         """Whether supports alone bear a load on the joints."""
 
+    @cached_property
+    def lengths(self) -> Float[np.ndarray, " pieces"]:
+        """Lengths of the pieces as drawn."""
+        chords = np.linalg.norm(self.chords, axis=1).tolist()
+        pairs = zip(self.members_of_pieces, chords, strict=True)
+        return np.array([self.members[m].arc_length(each, self.made[m]) for m, each in pairs])
+
     @property
-    @abstractmethod
     def weights(self) -> Float[np.ndarray, " pieces"]:
         """Weights per length; 0 where none is given."""
+        return np.array([self.made[m].weight or 0.0 for m in self.members_of_pieces])
 
     @property
-    @abstractmethod
     def bending(self) -> float:
-        """Mean bending stiffness of the members: the unit of bending stiffnesses."""
+        """Mean stiffness against bending in the members' planes: the unit of such stiffnesses."""
+        return float(np.mean([each.strain[-1] for each in self.made]))
 
     @property
-    @abstractmethod
-    def lengths(self) -> Float[np.ndarray, " pieces"]:
-        """Lengths of the pieces."""
+    def members_of_pieces(self) -> list[int]:
+        """Member to which each piece belongs."""
+        return [self.member_of(k) for k in range(len(self.ends))]
 
     def member_of(self, piece: int) -> int:
         """Member to which a piece belongs."""
@@ -335,7 +347,7 @@ class AnyFrameModel(ABC):
     def masses(self) -> Float[np.ndarray, " pieces"] | None:
         """Masses of the pieces, in units of force·time²/length; None if one is not known."""
         made, system, found = self.network, self.system, []
-        owner = np.array([made.member_of(k) for k in range(len(made.lengths))])
+        owner = np.array(made.members_of_pieces)
         for m, weight, length in zip(owner.tolist(), made.weights, made.lengths, strict=True):
             member = made.members[m]
             what = f"mass of member {member.name}"

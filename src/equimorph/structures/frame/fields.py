@@ -13,6 +13,7 @@ from equimorph.model.drawing import supports_of_point, unit_vectors
 from equimorph.structures.frame.any_frame import AnyFrame
 from equimorph.structures.frame.mechanics import FrameMechanics
 from equimorph.structures.frame.model import FrameModel
+from equimorph.structures.frame.strength import Nodal, NodalStrains
 
 
 class FrameFields(FrameMechanics, AnyFrame):
@@ -113,6 +114,15 @@ class FrameFields(FrameMechanics, AnyFrame):
         gap = last - first - change[:, :, -1]
         inside = first[:, :, None] + change + gap[:, :, None] * model.mesh.reference.nodes
         return np.asarray(inside.reshape(len(z), *self._elements))
+
+    def elastic(self, z: Lanes, p: Parameters) -> tuple[NodalStrains, Nodal]:
+        """Elastic curvatures about b at the nodes, nothing about other axes, and axial forces."""
+        model, (y, turns, strain) = self.model, self._fields(z, p)
+        pulls = self._pulls(y, turns[:, model.nodes.ravel()], strain)
+        bends = np.zeros((len(z), *model.nodes.shape, 3))
+        elastic = self._moments(z, p) / model.rigidity[:, None, None]
+        bends[..., 2] = elastic.reshape(bends.shape[:3])
+        return bends, np.asarray((pulls.tension / model.weights).reshape(bends.shape[:3]))
 
     @property
     def _elements(self) -> tuple[int, int, int]:

@@ -15,20 +15,21 @@ from equimorph.errors import InputError
 from equimorph.linalg.dense import multiply
 from equimorph.model import Descriptor, remember_call
 from equimorph.structures.any_network import edges_of_image, images, is_symmetry, parameter_exchange
-from equimorph.structures.contract import Symmetry
+from equimorph.structures.contract import Readers, Symmetry, Written
 from equimorph.structures.frame.any_model import Actuators, Loads
 from equimorph.structures.frame.fields import FrameFields
 from equimorph.structures.frame.mechanics import FrameMechanics
 from equimorph.structures.frame.model import FrameModel
 from equimorph.structures.frame.network import AXES, MemberSpec, SupportSpec, frame_network
 from equimorph.structures.network import Joints
+from equimorph.structures.stressed import Stressed
 from equimorph.structures.unit_system import Units, unit_system
 
 
 class DescribedFrame(FrameFields):
     """A planar frame with its descriptors, in the user's units."""
 
-    written: ClassVar[Mapping[str, str]] = {
+    written: ClassVar[Written] = {
         "displacement(joint,axis)": "displacement",
         "rotation(joint)": "rotation",
         "rotation(member,joint)": "rotation",
@@ -37,11 +38,15 @@ class DescribedFrame(FrameFields):
         "moment(member,joint)": "moment",
         "max_curvature(member)": "member_curvature",
         "max_curvature": "max_curvature",
+        **Stressed.written,
+        "max_strain(member)": "member_strain",
+        "max_stress(member)": "member_stress",
         "reaction(joint,axis)": "reaction",
         "travel(load)": "travel",
         "effort(actuator)": "effort_of",
         "energy": "total_energy",
     }
+    readers: ClassVar[Readers] = Stressed.readers
 
     @check_arguments
     @remember_call

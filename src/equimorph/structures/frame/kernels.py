@@ -1,4 +1,4 @@
-"""Compiled forces and stiffness of frames, eight lanes at a time."""
+"""Compiled forces and stiffness of frames, a vector of lanes at a time."""
 
 from equimorph.linalg.compiled import njit
 from equimorph.linalg.kernels import FLAGS, INNER, read_lanes, write_lanes

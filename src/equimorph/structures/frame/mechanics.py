@@ -39,7 +39,7 @@ class Tables:
         for m, row in enumerate(model.place[model.piece_nodes].tolist()):
             through = [n + c for c in forces[m, : self.ties[m, 0]].tolist()]
             found |= {(c, i) for c in through for i in row if i >= 0}
-            if model.network.members[m].EA is not None:
+            if model.network.made[m].EA is not None:
                 found |= {(c, d) for c in through for d in through if c >= d}
         corner = model.quadratic[: model.multipliers, : model.multipliers]
         found |= {(n + c, n + d) for c, d in zip(*np.nonzero(np.tril(corner)), strict=True)}

@@ -180,7 +180,7 @@ class FrameModel(AnyFrameModel):
     @cached_property
     def softness(self) -> Float[np.ndarray, " points"]:
         """γ: axial compliance over the quadrature weight."""
-        axial = [np.inf if each.EA is None else float(each.EA) for each in self.network.members]
+        axial = [np.inf if each.EA is None else each.EA for each in self.network.made]
         return np.asarray((self.force / np.array(axial))[self.owner] / self.weights)
 
     # --- members and joints ---------------------------------------------------------------------
@@ -188,7 +188,7 @@ class FrameModel(AnyFrameModel):
     @cached_property
     def rigidity(self) -> Float[np.ndarray, " members"]:
         """Bending stiffness of the members."""
-        return np.array([float(member.EI) for member in self.network.members]) / self.bending
+        return np.array([each.strain[0] for each in self.network.made]) / self.bending
 
     @cached_property
     def supports(self) -> Float[np.ndarray, "joints 3"]:

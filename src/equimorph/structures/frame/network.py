@@ -13,21 +13,21 @@ from equimorph.argument_notes import TWO_NAMES, positive_quantity
 from equimorph.array_types import Bool, Float
 from equimorph.errors import InputError
 from equimorph.structures.frame.any_model import WEIGHT, AnyFrameNetwork
+from equimorph.structures.frame.member import AnyMember
 from equimorph.structures.network import (
-    Edge,
     Joints,
-    arc_length,
     check_hinges,
     edges_between,
     places_of_joints,
     supported_joints,
 )
+from equimorph.structures.rod.sections import CrossSection, SectionProperties
 from equimorph.structures.unit_system import Quantity, UnitSystem
 
 
 @check_arguments
 @dataclass(frozen=True)
-class Member(Edge):
+class Member(AnyMember):
     """An elastic rod between two joints, straight or a circular arc where it is free of stress.
 
     Numbers are in the units of the frame; texts like "0.3 N m^2" are converted to these.
@@ -37,9 +37,9 @@ class Member(Edge):
     ends
         Names of its two joints, start and end.
     EI
-        Bending stiffness, in units of force · length²; positive.
+        Bending stiffness, in units of force · length²; 1 by default.
     EA
-        Axial stiffness, in units of force; None: inextensible.
+        Axial stiffness, in units of force; None: that of the section, or inextensible.
     curvature
         Curvature of the arc, in units of 1/length; positive turns left on the way from start to
         end. 0: straight.
@@ -50,9 +50,13 @@ class Member(Edge):
     mass
         In kg, or as a text; None: that of its weight in a frame with units. In a frame without
         units it is a number in any system to which the units of force, length and time belong.
+    section
+        A `Strip`, `Round`, `Tube` or `OwnSection` in place of EI, EA and weight.
+    inextensible
+        Whether the axial stiffness of the section is left out.
     """
 
-    edge: ClassVar[str] = "member"
+    from_section: ClassVar[tuple[str, ...]] = ("EI", "EA", "weight")
     quantities: ClassVar[Mapping[str, str]] = {
         "EI": "force·length²",
         "EA": "force",
@@ -60,21 +64,25 @@ class Member(Edge):
         "weight": "force/length",
     }
     ends: Annotated[Sequence[str], TWO_NAMES]
-    EI: Quantity = 1.0
+    EI: Quantity | None = None
     EA: Quantity | None = None
     curvature: Quantity = 0.0
     hinges: Sequence[str] = ()
     weight: Quantity | None = None
     mass: Quantity | None = None
+    section: CrossSection | Mapping[str, Any] | None = None
+    inextensible: bool = False
 
     def __post_init__(self) -> None:
-        """Check the hinges."""
+        """Check the hinges, and that nothing is said twice; EI is 1 if nothing says what it is."""
         check_hinges(self, self.hinges, "one or both of its ends")
+        self.check_section()
+        if self.section is None and self.EI is None:
+            object.__setattr__(self, "EI", 1.0)
 
-    def length(self, chord: float) -> float:
-        """Length of the arc over a chord; InputError if no slender arc fits."""
-        gyration = 0.0 if self.EA is None else float(np.sqrt(float(self.EI) / float(self.EA)))
-        return arc_length(self, float(self.curvature), chord, gyration)
+    def bending_and_twist(self, section: SectionProperties | None) -> tuple[float]:
+        """EI."""
+        return (float(self.EI if section is None else section.EI),)  # type: ignore[arg-type]  # set above
 
     def data(self) -> dict[str, Any]:
         """Return what it is made from."""
@@ -158,13 +166,6 @@ class FrameNetwork(AnyFrameNetwork):
     sizes_of_loads: ClassVar[tuple[int, ...]] = (2, 3)
 
     @cached_property
-    def lengths(self) -> Float[np.ndarray, " members"]:
-        """Lengths of the members, free of stress."""
-        chords = np.hypot(*self.chords.T)
-        pairs = zip(self.members, chords, strict=True)
-        return np.array([member.length(float(chord)) for member, chord in pairs])
-
-    @cached_property
     def hinged(self) -> Bool[np.ndarray, "members 2"]:
         """Which ends are hinged."""
         return np.array([[end in each.hinges for end in each.ends] for each in self.members])
@@ -179,16 +180,6 @@ class FrameNetwork(AnyFrameNetwork):
     def supports_data(self) -> list[dict[str, Any]]:
         """Tables of the supports."""
         return [support_data(row) for row in self.supports]
-
-    @property
-    def bending(self) -> float:
-        """Mean bending stiffness of the members: the unit of bending stiffnesses."""
-        return float(np.mean([float(member.EI) for member in self.members]))
-
-    @property
-    def weights(self) -> Float[np.ndarray, " members"]:
-        """Weights per length; 0 where none is given."""
-        return np.array([float(member.weight or 0.0) for member in self.members])
 
     @property
     def turning_places(self) -> int:
@@ -250,7 +241,8 @@ def frame_network(
     held = np.zeros((len(names), 3))
     for at, joint, given in supported_joints(supports, names):
         held[at] = stiffnesses(joint, given, system)
-    result = FrameNetwork(names, places, ends, made, held)
+    stiff = tuple(each.stiffness(system) for each in made)
+    result = FrameNetwork(names, places, ends, made, stiff, held)
     result.check()
     assert result.lengths.all()  # arcs that do not reach are refused here
     _check_angles(result)

@@ -95,6 +95,7 @@ class AnyRod(HeavyRod):
 
     written: ClassVar[Written] = {
         "max_curvature": "max_curvature",
+        "max_shortening": "max_shortening",
         "energy": "total_energy",
         "clearance(s)": "clearance",
         "support_force(x)": "support_force",
@@ -306,6 +307,15 @@ class AnyRod(HeavyRod):
 
         label, symbol = self.units.label(quantity), f"{symbol}({_SYMBOLS.get(s, f'{s:g}')})"
         return Descriptor(name_at(name, float(s)), label, value, symbol, self.signature)
+
+    @property
+    def may_collapse(self) -> bool:
+        """A rod that stretches may be pressed together, too."""
+        return self.mechanics.is_extensible
+
+    def shortenings(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes points"]:
+        """Elastic shortenings of the axis at the nodes of every element."""
+        return self.mechanics.shortenings(z, p)
 
     @property
     def elevation(self) -> Descriptor:

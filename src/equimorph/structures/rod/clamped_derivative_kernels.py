@@ -1,4 +1,4 @@
-"""Compiled kernels of the rod's residual, matrix and derivatives, eight lanes at a time.
+"""Compiled kernels of the rod's residual, matrix and derivatives, a vector of lanes at a time.
 
 L = Σ ½ θᵀKθ + Σᵢ (aᵢ sin θᵢ + bᵢ cos θᵢ) − λν with a = μm − qR and b = λm; see
 `structures.rod.kernels`. At least eight lanes; the last block overlaps the one before.

@@ -1,4 +1,4 @@
-"""Compiled kernels of the recovery, eight lanes at a time; at least eight lanes.
+"""Compiled kernels of the recovery, a vector of lanes at a time; at least eight lanes.
 
 From a vertex, where θ and κ are superconvergent, the rod's equation ``κ' = 4π² f`` with
 ``f = −λ sin θ + (μ − qρ) cos θ`` is followed by Taylor series. With ``κ = Σ c_k τ^k`` the series

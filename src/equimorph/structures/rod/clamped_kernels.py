@@ -1,4 +1,4 @@
-"""Compiled kernels of the rod, eight lanes at a time.
+"""Compiled kernels of the rod, a vector of lanes at a time.
 
 L = Σ ½ θᵀKθ + Σᵢ (μ mᵢ − q Rᵢ) sin θᵢ + λ mᵢ cos θᵢ − λν with quadrature weights m, load weights
 R = m ρ and K the stiffness over 4π². Kernels need at least eight lanes; where these are not a

@@ -1,8 +1,9 @@
 """Strains and stresses in the surface of a cross-section that is bent and twisted.
 
-Fibres at the distances y and z from the axes b and n have the strain ε = κ_b y + κ_n z and the
-stress σ = E ε; twist adds the shear τ of Saint-Venant. What counts is the stress of von Mises,
-√(σ² + 3 τ²). It is largest in the surface, since σ is linear and τ² subharmonic.
+Fibres at the distances y and z from the axes b and n have the strain ε = κ_b y + κ_n z + N/(EA),
+where an axial force N counts, and the stress σ = E ε; twist adds the shear τ of Saint-Venant. What
+counts is the stress of von Mises, √(σ² + 3 τ²). It is largest in the surface, since σ is linear and
+τ² subharmonic.
 """
 
 from dataclasses import dataclass
@@ -35,6 +36,8 @@ class Fibres:
         Whether all axes are alike: bends about n and b are then one bend, about b.
     E, nu
         Young's modulus and Poisson's ratio.
+    EA
+        Axial stiffness.
     """
 
     y: Along
@@ -43,28 +46,33 @@ class Fibres:
     round: bool
     E: float
     nu: float
+    EA: float
 
-    def strain(self, strains: Strains) -> Sizes:
-        """Largest strain of bending, for twists and curvatures about n and b."""
-        return np.asarray(self._bending(strains).max(axis=-1))
+    def strain(self, strains: Strains, force: Sizes | None = None) -> Sizes:
+        """Largest strain along the rod, for twists and curvatures about n and b, axial forces."""
+        return np.asarray(self._normal(strains, force).max(axis=-1))
 
-    def stress(self, strains: Strains) -> Sizes:
-        """Largest stress of von Mises, for twists and curvatures about n and b."""
+    def stress(self, strains: Strains, force: Sizes | None = None) -> Sizes:
+        """Largest stress of von Mises, for twists and curvatures about n and b, axial forces."""
         sheared = np.abs(strains[..., :1]) * self.shear / (2.0 * (1.0 + self.nu))
-        both = self._bending(strains) ** 2 + 3.0 * sheared**2
+        both = self._normal(strains, force) ** 2 + 3.0 * sheared**2
         return np.asarray(self.E * np.sqrt(both.max(axis=-1)))
 
-    def _bending(self, strains: Strains) -> Float[np.ndarray, "lanes points fibres"]:
+    def _normal(
+        self, strains: Strains, force: Sizes | None
+    ) -> Float[np.ndarray, "lanes points fibres"]:
+        """Strain along the rod where bending and the axial force add up."""
+        axial = 0.0 if force is None else np.abs(force)[..., None] / self.EA
         aside, bend = np.abs(strains[..., 1:2]), np.abs(strains[..., 2:])
         if self.round:
-            return np.asarray(np.hypot(aside, bend) * self.y)
-        return np.asarray(bend * self.y + aside * self.z)
+            return np.asarray(axial + np.hypot(aside, bend) * self.y)
+        return np.asarray(axial + bend * self.y + aside * self.z)
 
 
-def circle(diameter: float, E: float, nu: float) -> Fibres:
+def circle(diameter: float, E: float, nu: float, EA: float) -> Fibres:
     """One fibre of a circle, with or without a hole."""
     at = np.array([0.5 * diameter])
-    return Fibres(at, 0.0 * at, at, True, E, nu)
+    return Fibres(at, 0.0 * at, at, True, E, nu, EA)
 
 
 def rectangle(width: float, thickness: float, E: float, nu: float) -> Fibres:
@@ -76,7 +84,7 @@ def rectangle(width: float, thickness: float, E: float, nu: float) -> Fibres:
     )
     y, z = np.concatenate(sides, axis=1)
     shear = [side_shear(half, half_width, FIBRES), side_shear(half_width, half, FIBRES)]
-    return Fibres(y, z, np.concatenate(shear), False, E, nu)
+    return Fibres(y, z, np.concatenate(shear), False, E, nu, E * width * thickness)
 
 
 def side_shear(distance: float, half: float, at: Along) -> Along:

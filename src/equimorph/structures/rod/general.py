@@ -123,6 +123,17 @@ class GeneralMechanics(JointEquations, PlanarMechanics):
             good[doubtful] = gap < LARGEST_GAP
         return np.asarray(good)
 
+    @property
+    def is_extensible(self) -> bool:
+        """Whether the axis stretches."""
+        return bool(self.model.softness.any())
+
+    def shortenings(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes points"]:
+        """Elastic shortenings of the axis at the nodes of every element."""
+        turned = self._turned(self.nodal_angles(z, p))
+        normal, pull = self._normal(turned, self.scalars(z, p))
+        return np.asarray(self.model.softness * (normal + pull))
+
     # --- contract ---------------------------------------------------------------------------
 
     def energy(self, z: Lanes, p: Parameters) -> Values:
@@ -131,48 +142,49 @@ class GeneralMechanics(JointEquations, PlanarMechanics):
         total = 0.5 * np.einsum("li,ij,lj->l", theta, self.layout.assembled, theta)
         total -= np.einsum("li,ji,lj->l", theta, self.model.slope, y)
         total += 0.5 * np.einsum("li,ij,lj->l", y, self.model.quadratic, y)
-        normal, pull, _ = self._normal(theta, y)
+        normal, pull = self._normal(self._turned(theta), y)
         total += (normal - 0.5 * self.model.softness * (normal + pull) ** 2).sum(axis=1)
         if self._area is not None:
             total -= self._pressure(y) * self._area.value(theta)
         return np.asarray(total - (y[:, :m] * self._gradient(theta, y)[:, :m]).sum(axis=1))
 
-    def _normal(self, theta: Nodal, y: Scalars) -> tuple[Points, Points, Points]:
-        """N, T and θ at the nodes of every element."""
-        angles = theta[:, self.mesh.element_nodes.ravel()]
-        a = np.einsum("lj,ji->li", y, self.model.sine)
-        b = np.einsum("lj,ji->li", y, self.model.cosine)
-        pull = np.einsum("lj,ji->li", y, self.model.tension)
-        return a * np.sin(angles) + b * np.cos(angles), pull, angles
+    def _turned(self, theta: Nodal) -> tuple[Points, Points]:
+        """Return sin θ and cos θ at the nodes of every element."""
+        places = self.mesh.element_nodes.ravel()
+        return np.sin(theta)[:, places], np.cos(theta)[:, places]
+
+    def _normal(self, turned: tuple[Points, Points], y: Scalars) -> tuple[Points, Points]:
+        """N and T at the nodes of every element."""
+        a, b, pull = (y @ each for each in (self.model.sine, self.model.cosine, self.model.tension))
+        return a * turned[0] + b * turned[1], pull
 
     def _pressure(self, y: Scalars) -> Values:
         return np.asarray(np.einsum("j,lj->l", self.model.pressure, y))
 
     def _gradient(self, theta: Nodal, y: Scalars) -> Scalars:
         """∂L/∂y at fixed θ."""
-        normal, pull, angles = self._normal(theta, y)
-        stretch = 1.0 - self.model.softness * (normal + pull)
-        out = np.einsum("li,ji->lj", stretch * np.sin(angles), self.model.sine)
-        out += np.einsum("li,ji->lj", stretch * np.cos(angles), self.model.cosine)
-        out += np.einsum("li,ji->lj", stretch - 1.0, self.model.tension)
-        out -= np.einsum("li,ji->lj", theta, self.model.slope)
+        sine, cosine = turned = self._turned(theta)
+        normal, pull = self._normal(turned, y)
+        stretch, model = 1.0 - self.model.softness * (normal + pull), self.model
+        out = (stretch * sine) @ model.sine.T + (stretch * cosine) @ model.cosine.T
+        out += (stretch - 1.0) @ model.tension.T - theta @ model.slope.T
         if self._area is not None:
-            out -= self._area.value(theta)[:, None] * self.model.pressure
-        return np.asarray(out + np.einsum("li,ij->lj", y, self.model.quadratic))
+            out -= self._area.value(theta)[:, None] * model.pressure
+        return np.asarray(out + y @ model.quadratic)
 
     def _end_moments(self, theta: Nodal, y: Scalars) -> Float[np.ndarray, "lanes 2"]:
         """∂L/∂θ at both ends of the rod."""
-        d, model = self.mesh.degree, self.model
-        normal, pull, angles = self._normal(theta, y)
-        a = np.einsum("lj,ji->li", y, model.sine[:, [0, -1]])
-        b = np.einsum("lj,ji->li", y, model.cosine[:, [0, -1]])
-        angles, normal = angles[:, [0, -1]], (normal + pull)[:, [0, -1]]
-        out = (1.0 - model.softness[[0, -1]] * normal) * (a * np.cos(angles) - b * np.sin(angles))
-        out -= np.einsum("lj,jk->lk", y, model.slope[:, [0, -1]])
-        out[:, 0] += np.einsum("li,i->l", theta[:, : d + 1], model.stiffness[0, 0])
-        out[:, 1] += np.einsum("li,i->l", theta[:, -d - 1 :], model.stiffness[-1, -1])
+        d, model, ends = self.mesh.degree, self.model, [0, -1]
+        tables = (model.sine, model.cosine, model.tension)
+        a, b, pull = (y @ each[:, ends] for each in tables)
+        sine, cosine = np.sin(theta[:, ends]), np.cos(theta[:, ends])
+        stretch = 1.0 - model.softness[ends] * (a * sine + b * cosine + pull)
+        out = stretch * (a * cosine - b * sine)
+        out -= y @ model.slope[:, ends]
+        out[:, 0] += theta[:, : d + 1] @ model.stiffness[0, 0]
+        out[:, 1] += theta[:, -d - 1 :] @ model.stiffness[-1, -1]
         if self._area is not None:
-            out -= self._pressure(y)[:, None] * self._area.gradient(theta)[:, [0, -1]]
+            out -= self._pressure(y)[:, None] * self._area.gradient(theta)[:, ends]
         return np.asarray(out)
 
     def support_forces(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes 2"]:

@@ -1,4 +1,4 @@
-"""Compiled kernel of the fields of general rods, eight lanes at a time; at least eight lanes.
+"""Compiled kernel of the fields of general rods, a vector of lanes at a time; at least eight lanes.
 
 In an element, from its left end, where θ and the moment M are superconvergent,
 ``M' = (1 − N/EA) N'`` with N as in `model.RodModel`, ``κ = (M + bending)/rigidity``, ``θ' = κ``.

@@ -1,4 +1,4 @@
-"""Compiled kernels of the general rod, eight lanes at a time.
+"""Compiled kernels of the general rod, a vector of lanes at a time.
 
 The Lagrangian is that of `model.RodModel`, its tables those of `packed.Packed`; `points` are the
 nodes of every element, `nodes` those of the rod. At least eight lanes; where these are not a

@@ -1,4 +1,4 @@
-"""Compiled kernel of the fused Newton step of general rods, eight lanes at a time."""
+"""Compiled kernel of the fused Newton step of general rods, a vector of lanes at a time."""
 
 import numpy as np
 

@@ -13,7 +13,7 @@ import numpy as np
 from equimorph.array_types import Float
 from equimorph.arrays import Lanes, Nodal, Parameters, Scalars, Velocity
 from equimorph.model import Parameter
-from equimorph.structures.contract import Structure
+from equimorph.structures.collapse import Shortening
 from equimorph.structures.rod.discretisation import Mesh
 from equimorph.structures.rod.model import RodModel
 from equimorph.structures.rod.units import Units
@@ -106,7 +106,7 @@ def moved_places(
     return moved.reshape(len(moved), -1, moved.shape[3])
 
 
-class HeavyRod(Structure):
+class HeavyRod(Shortening):
     """A rod whose mass is spread evenly along its centre line."""
 
     units: Units

@@ -1,4 +1,4 @@
-"""Compiled kernel of movements out of the plane, eight lanes at a time; at least eight lanes.
+"""Compiled kernel of movements out of the plane, a vector of lanes at a time; at least eight lanes.
 
 The second variation is that of `lateral.LateralBlock` in φ and ψ at the nodes. Inner nodes of an
 element are eliminated, then its left vertex: what remains of a chain is the *front*, the 2 × 2

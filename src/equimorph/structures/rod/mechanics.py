@@ -74,6 +74,16 @@ class RodMechanics(Equations):
     def sample(self, p: Parameters, generator: np.random.Generator) -> Lanes:
         """Random guesses."""
 
+    @property
+    def is_extensible(self) -> bool:
+        """Whether the axis stretches."""
+        return False
+
+    def shortenings(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes points"]:
+        """Elastic shortenings of the axis at the nodes of every element; 0 if inextensible."""
+        del p
+        return np.zeros((len(z), 1))
+
     @abstractmethod
     def resolved(self, z: Lanes, p: Parameters) -> Flags:
         """Whether the highest Legendre coefficients of the rotations are small in every element."""

@@ -121,7 +121,9 @@ class _Shape(CrossSection):
 
     def _surface(self, system: UnitSystem, young: float) -> Fibres:
         """That of a circle."""
-        return circle(self._number("diameter", "length", system), young, self.nu)
+        diameter, axial = self._number("diameter", "length", system), self._in(system).EA
+        assert axial is not None  # known of all shapes
+        return circle(diameter, young, self.nu, axial)
 
     def _stiffnesses(
         self, area: float, second: tuple[float, float], torsion: float, system: UnitSystem
@@ -314,12 +316,5 @@ def cross_section(given: Any) -> CrossSection:
             f"{', '.join(map(repr, SECTIONS))}; got {content.get('kind', given)!r}."
             f"{suggestion(kind, list(SECTIONS))}"
         )
-    keys = [each.name for each in fields(SECTIONS[kind])]  # type: ignore[arg-type]  # as above
     del content["kind"]
-    try:
-        return SECTIONS[kind](**content)
-    except TypeError:
-        raise InputError(
-            f"`section` must have the data of a {kind} ({', '.join(keys)}); got "
-            f"{', '.join(content) or 'none'}."
-        ) from None
+    return SECTIONS[kind](**content)

@@ -8,36 +8,24 @@ from abc import abstractmethod
 from functools import cached_property
 from typing import ClassVar
 
-import numpy as np
-
-from equimorph.argument_checks import check_arguments
-from equimorph.arrays import Lanes, Parameters, Values
-from equimorph.errors import InputError, MissingError
-from equimorph.model import Descriptor, remember_call
+from equimorph.errors import MissingError
 from equimorph.structures.contract import Readers, Written
 from equimorph.structures.rod.any_rod import AnyRod
 from equimorph.structures.rod.fibres import Fibres
 from equimorph.structures.rod.rod_description import RodDescription
 from equimorph.structures.rod.terms import Curvature
-from equimorph.structures.rod.units import SI
-from equimorph.structures.unit_system import Quantity, UnitSystem
+from equimorph.structures.stressed import Stressed
+from equimorph.structures.unit_system import UnitSystem
 
-SAFEST = 1e6
-"""Largest safety factor: that of a straight rod has no bound."""
 FREE = ("stiffness", "curvature", "side_curvature", "natural_twist")
 """Profiles that have their defaults in a uniform rod that is straight when free of stress."""
 
 
-class StressedRod(AnyRod):
+class StressedRod(Stressed, AnyRod):
     """A rod with descriptors of strain, stress and safety, which need the size of its section."""
 
-    written: ClassVar[Written] = {
-        **AnyRod.written,
-        "max_strain": "max_strain",
-        "max_stress": "max_stress",
-        "safety_factor(strength)": "safety_factor",
-    }
-    readers: ClassVar[Readers] = {**AnyRod.readers, "strength": str}
+    written: ClassVar[Written] = {**AnyRod.written, **Stressed.written}
+    readers: ClassVar[Readers] = {**AnyRod.readers, **Stressed.readers}
 
     @property
     @abstractmethod
@@ -45,49 +33,9 @@ class StressedRod(AnyRod):
         """The rod as its user describes it."""
 
     @property
-    @abstractmethod
-    def max_strain(self) -> Descriptor:
-        """Largest strain of bending along the rod."""
-
-    @property
-    @abstractmethod
-    def max_stress(self) -> Descriptor:
-        """Largest stress along the rod."""
-
-    @check_arguments
-    @remember_call
-    def safety_factor(self, strength: Quantity) -> Descriptor:
-        """A strength over the largest stress, at most 1e6: ``rod.safety_factor("900 MPa") >= 1.5``.
-
-        Parameters
-        ----------
-        strength
-            Stress that the material bears, a number in the rod's units or a text.
-
-        Raises
-        ------
-        InputError
-            If it is not positive or no stress, or as of `max_strain`.
-        """
-        number = float(self._system.number(strength, "force/length²", "strength"))
-        if not number > 0.0:
-            raise InputError(f"`strength` must be positive; got {strength}.")
-        stress = self.max_stress
-
-        def value(z: Lanes, p: Parameters) -> Values:
-            return number / np.maximum(stress.function(z, p), number / SAFEST)
-
-        name = f"safety_factor({strength})"
-        return Descriptor(name, "1", value, "safety factor", stress.origin, stress.place)
-
-    @property
-    def stress_label(self) -> str:
-        """Unit of stresses."""
-        return self._system.label("force/length²")
-
-    @property
-    def _system(self) -> UnitSystem:
-        return SI if self.units.system.plain else self.units.system
+    def own_system(self) -> UnitSystem:
+        """Units of the rod."""
+        return self.units.system
 
     @cached_property
     def fibres(self) -> Fibres:
@@ -99,7 +47,7 @@ class StressedRod(AnyRod):
             If there is no section of a shape, or the curvature is not that of bending alone.
         """
         section = self.space_options.section
-        fibres = None if section is None else section.fibres(self._system)
+        fibres = None if section is None else section.fibres(self.stress_system)
         if fibres is None:
             raise MissingError(
                 "`max_strain` must be that of a rod with a section, like Rod(section=Strip(...), "

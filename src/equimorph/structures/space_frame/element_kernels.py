@@ -1,4 +1,4 @@
-"""Compiled forces and stiffness of one element of a frame in space, eight lanes at a time.
+"""Compiled forces and stiffness of one element of a frame in space, a vector of lanes at a time.
 
 Rotations change by vectors ω on axes that turn along as drawn, w → w exp(ω/2). With the relative
 turns r_ij = w_i* w_j, D the derivative, s_i = Σ_j D_ij r_ij and strains v_i = 2 vec s_i,
@@ -16,7 +16,7 @@ the second variation ½ (f̃ t₀ᵀ + t₀ f̃ᵀ) − N 1. A hinged node turns
 from equimorph.linalg.compiled import njit
 from equimorph.linalg.kernels import INNER
 from equimorph.linalg.simd import load, spread, store
-from equimorph.structures.spatial.element_kernels import store_turn
+from equimorph.structures.spatial.element_kernels import add_turned, store_turn
 
 
 @njit(**INNER)
@@ -58,8 +58,8 @@ def relate(e, nodes, derivative, inverse, w, relative, sums, strain):
 
 
 @njit(**INNER)
-def fill_jacobian(order, width, derivative, inverse, relative, sums, jacobian):
-    """δv by ω: rows 3i + c, columns 3j + k."""
+def fill_turns(order, derivative, inverse, relative, sums, turns):
+    """δv at one node by ω of another, as in `stiffen`."""
     for i in range(order):
         for j in range(order):
             at, d = 4 * (i * order + j), spread(derivative[i, j] * inverse)
@@ -70,7 +70,7 @@ def fill_jacobian(order, width, derivative, inverse, relative, sums, jacobian):
                 r1 = r1 + load(sums, 4 * i + 1)
                 r2 = r2 + load(sums, 4 * i + 2)
                 r3 = r3 + load(sums, 4 * i + 3)
-            store_turn(jacobian, 3 * i * width + 3 * j, width, r0, r1, r2, r3)
+            store_turn(turns, i * order + j, r0, r1, r2, r3)
 
 
 @njit(**INNER)
@@ -93,38 +93,39 @@ def fill_moments(e, order, weights, stiff, moment_of_strain, strain, free, rate,
 
 
 @njit(**INNER)
-def bend(order, width, moment, change, jacobian, gradient, rates):
+def bend(order, moment, change, turns, gradient, rates):
     """Gradient by the moments, and its rate by actuated strains."""
-    for a in range(3 * order):
-        total, turned = spread(0.0), spread(0.0)
-        for r in range(3 * order):
-            slope = load(jacobian, r * width + a)
-            total = total + slope * load(moment, r)
-            turned = turned + slope * load(change, r)
-        store(gradient, a, total)
-        store(rates, a, turned)
+    for i in range(order):
+        for a in range(order):
+            at = 3 * a
+            add_turned(turns, i * order + a, moment, 3 * i, gradient, at, 1)
+            add_turned(turns, i * order + a, change, 3 * i, rates, at, 1)
 
 
 @njit(**INNER)
-def stiffen(e, order, width, weights, stiff, jacobian, scaled, matrix):
-    """JᵀSJ: both halves of the matrix of an element."""
-    size = 3 * order
+def scale_general(e, order, weights, stiff, turns, scaled):
+    """S A of all pairs of nodes, in the order of `scale_turns`."""
+    zero = spread(0.0)
     for i in range(order):
-        for c in range(size):
-            for a in range(3):
-                total = spread(0.0)
-                for b in range(3):
-                    row = (3 * i + b) * width + c
-                    own = spread(weights[e, i] * stiff[e, i, a, b])
-                    total = total + own * load(jacobian, row)
-                store(scaled, (3 * i + a) * width + c, total)
+        for a in range(order):
+            at, to = 4 * (i * order + a), 9 * (a * order + i)
+            s0, s1 = load(turns, at), load(turns, at + 1)
+            s2, s3 = load(turns, at + 2), load(turns, at + 3)
+            for k in range(3):
+                k0 = spread(weights[e, i] * stiff[e, i, k, 0])
+                k1 = spread(weights[e, i] * stiff[e, i, k, 1])
+                k2 = spread(weights[e, i] * stiff[e, i, k, 2])
+                store(scaled, to + k, k0 * s0 + k1 * s3 - k2 * s2)
+                store(scaled, to + 3 + k, zero - k0 * s3 + k1 * s0 + k2 * s1)
+                store(scaled, to + 6 + k, k0 * s2 - k1 * s1 + k2 * s0)
+
+
+@njit(**INNER)
+def mirror(size, width, matrix):
+    """Copy the upper triangle of an element's matrix to the lower one."""
     for a in range(size):
-        for b in range(a + 1):
-            total = spread(0.0)
-            for r in range(size):
-                total = total + load(jacobian, r * width + a) * load(scaled, r * width + b)
-            store(matrix, a * width + b, total)
-            store(matrix, b * width + a, total)
+        for b in range(a):
+            store(matrix, a * width + b, load(matrix, b * width + a))
 
 
 @njit(**INNER)

@@ -10,6 +10,7 @@ from equimorph.arrays import Lanes, Parameters
 from equimorph.model import Support
 from equimorph.model.drawing import supports_of_point
 from equimorph.structures.frame.any_frame import AnyFrame
+from equimorph.structures.frame.strength import Nodal, NodalStrains
 from equimorph.structures.space_frame.lagrangian import gathered
 from equimorph.structures.space_frame.mechanics import SpatialFrameMechanics
 from equimorph.structures.space_frame.model import SpatialFrameModel
@@ -154,10 +155,20 @@ class SpatialFrameFields(SpatialFrameMechanics, AnyFrame):
             np.einsum("leica,leic->leia", self.cross_sections(z, p), self.moments(z, p))
         )
 
+    def elastic_strains(self, z: Lanes, p: Parameters) -> Vectors:
+        """Elastic twist and curvatures about n and b at the points, per length as drawn."""
+        model = self.model
+        return np.asarray(self.section_moments(z, p) / model.rigidity[model.owner][:, None])
+
+    def elastic(self, z: Lanes, p: Parameters) -> tuple[NodalStrains, Nodal]:
+        """Elastic twist and curvatures about n and b at the nodes, and axial forces."""
+        _, w, _, y = self.jets(z, p)
+        return self.elastic_strains(z, p), self.tensions(w, y)[1][0]
+
     def section_strains(self, z: Lanes, p: Parameters) -> Vectors:
         """Twist and curvatures about n and b at the points, per length as drawn."""
         model = self.model
-        elastic = self.section_moments(z, p) / model.rigidity[model.owner][:, None]
+        elastic = self.elastic_strains(z, p)
         free = self.actuated(self.jets(z, p)[3])[0][0][:, model.owner]
         bends = np.array([float(each.curvature) for each in model.network.members]) * model.length
         drawn = bends[model.network.owner][model.owner][:, None] * np.array([0.0, 0.0, 1.0])

@@ -12,6 +12,7 @@ from equimorph.array_types import Float
 from equimorph.arrays import Flags, Lanes, Parameters, Values
 from equimorph.errors import InputError
 from equimorph.model import Descriptor, remember_call
+from equimorph.structures.contract import Readers, Written
 from equimorph.structures.discrete import STEPS, SURE
 from equimorph.structures.frame.any_model import Actuators, Loads, Patterns
 from equimorph.structures.network import Joints
@@ -21,6 +22,7 @@ from equimorph.structures.space_frame.mechanics import SpatialFrameMechanics
 from equimorph.structures.space_frame.member import SpatialMemberSpec, SpatialSupportSpec
 from equimorph.structures.space_frame.model import SpatialFrameModel
 from equimorph.structures.space_frame.network import spatial_network
+from equimorph.structures.stressed import Stressed
 from equimorph.structures.unit_system import Units, unit_system
 
 
@@ -82,7 +84,7 @@ SECTION = ("t", "n", "b")
 class DescribedSpatialFrame(SpatialFrameFields):
     """A frame in space with its descriptors, in the user's units."""
 
-    written: ClassVar[Mapping[str, str]] = {
+    written: ClassVar[Written] = {
         "displacement(joint,axis)": "displacement",
         "place(joint,axis)": "place",
         "rotation(joint,axis)": "rotation",
@@ -91,12 +93,16 @@ class DescribedSpatialFrame(SpatialFrameFields):
         "hinge(member,joint)": "hinge",
         "max_curvature(member)": "member_curvature",
         "max_curvature": "max_curvature",
+        **Stressed.written,
+        "max_strain(member)": "member_strain",
+        "max_stress(member)": "member_stress",
         "reaction(joint,axis)": "reaction",
         "couple(joint,axis)": "couple",
         "travel(load)": "travel",
         "effort(actuator)": "effort_of",
         "energy": "total_energy",
     }
+    readers: ClassVar[Readers] = Stressed.readers
 
     @check_arguments
     @remember_call

@@ -1,4 +1,4 @@
-"""Compiled forces and stiffness of frames in space, eight lanes at a time.
+"""Compiled forces and stiffness of frames in space, a vector of lanes at a time.
 
 Elements are those of `element_kernels`.
 """
@@ -9,11 +9,12 @@ from equimorph.linalg.simd import LANES, load, spread, store, work_rows
 from equimorph.structures.space_frame.element_kernels import (
     add_to,
     bend,
-    fill_jacobian,
     fill_moments,
+    fill_turns,
+    mirror,
     pull,
     relate,
-    stiffen,
+    scale_general,
     turn_moments,
 )
 from equimorph.structures.space_frame.node_kernels import (
@@ -23,6 +24,7 @@ from equimorph.structures.space_frame.node_kernels import (
     set_turns,
     vector_sums,
 )
+from equimorph.structures.spatial.element_kernels import stiffen
 
 
 @njit(**INNER)
@@ -102,7 +104,7 @@ def linearise_lanes(
         work_rows(4 * order),
         work_rows(3 * order),
     )
-    jacobian, scaled = work_rows(3 * order * width), work_rows(3 * order * width)
+    turns, scaled = work_rows(4 * order * order), work_rows(9 * order * order)
     moment, change = work_rows(3 * order), work_rows(3 * order)
     gradient, rates = work_rows(width + 3), work_rows(width)
     matrix, border, sums = work_rows(width * width), work_rows(3 * width), work_rows(12)
@@ -136,12 +138,14 @@ def linearise_lanes(
             stretch, slack = spread(1.0) + load(sums, 0), load(border, 0)
             matrix[:], border[:], sums[:], gradient[:], rates[:] = 0.0, 0.0, 0.0, 0.0, 0.0
             relate(e, nodes, derivative, inverse[e], w, relative, sums_of, strain)
-            fill_jacobian(order, width, derivative, inverse[e], relative, sums_of, jacobian)
+            fill_turns(order, derivative, inverse[e], relative, sums_of, turns)
             fill_moments(
                 e, order, weights, stiff, moment_of_strain, strain, own, own_rate, moment, change
             )
-            bend(order, width, moment, change, jacobian, gradient, rates)
-            stiffen(e, order, width, weights, stiff, jacobian, scaled, matrix)
+            bend(order, moment, change, turns, gradient, rates)
+            scale_general(e, order, weights, stiff, turns, scaled)
+            stiffen(order, width, turns, scaled, matrix, 0)
+            mirror(3 * order, width, matrix)
             turn_moments(order, width, derivative, inverse[e], relative, strain, moment, matrix)
             pull(
                 e, order, width, nodes, weights, tangents, arclengths, soft[k], counts[k], ties[k],

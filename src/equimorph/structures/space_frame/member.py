@@ -16,8 +16,9 @@ from equimorph.argument_notes import (
 )
 from equimorph.array_types import Float
 from equimorph.errors import InputError
-from equimorph.structures.network import Edge, arc_length, check_hinges
-from equimorph.structures.rod.sections import CrossSection, cross_section
+from equimorph.structures.frame.member import AnyMember
+from equimorph.structures.network import check_hinges
+from equimorph.structures.rod.sections import CrossSection, SectionProperties
 from equimorph.structures.unit_system import Quantity, UnitSystem
 
 BALL = "ball"
@@ -35,21 +36,9 @@ Hinges = Annotated[
 ]
 
 
-@dataclass(frozen=True)
-class Stiffness:
-    """Numbers of a cross-section in the units of the frame.
-
-    strain: against twist, bending about n and bending about b; EA None: inextensible.
-    """
-
-    strain: tuple[float, float, float]
-    EA: float | None
-    weight: float | None
-
-
 @check_arguments
 @dataclass(frozen=True)
-class SpatialMember(Edge):
+class SpatialMember(AnyMember):
     """An elastic rod through two or more joints, free of stress as drawn.
 
     It is drawn straight from joint to joint, or in arcs towards its normal, and passes through
@@ -92,7 +81,7 @@ class SpatialMember(Edge):
         rotary inertia.
     """
 
-    edge: ClassVar[str] = "member"
+    from_section: ClassVar[tuple[str, ...]] = ("EI", "EI_out", "GJ", "EA", "weight")
     through: ClassVar[str] = "joints"
     quantities: ClassVar[Mapping[str, str]] = {
         **dict.fromkeys(("EI", "EI_out", "GJ"), "force·length²"),
@@ -116,14 +105,7 @@ class SpatialMember(Edge):
     def __post_init__(self) -> None:
         """Check the hinges, and that nothing is said twice."""
         check_hinges(self, self.hinges, "some of its joints")
-        if self.section is None:
-            return
-        for key in ("EI", "EI_out", "GJ", "EA", "weight"):
-            if getattr(self, key) is not None:
-                raise InputError(
-                    f"`{key}` of member {self.name} must be left out beside `section`, which gives "
-                    f"it; got {getattr(self, key)!r}."
-                )
+        self.check_section()
 
     def hinge(self, joint: str) -> str | tuple[float, ...] | None:
         """What connects it to a joint: None if rigidly joined, "ball", or the axis of a hinge."""
@@ -140,22 +122,14 @@ class SpatialMember(Edge):
         strains = system.numbers(self.strains, "1/length", f"strains of member {self.name}")
         return replace(found, strains=tuple(float(x) for x in strains))
 
-    def stiffness(self, system: UnitSystem) -> Stiffness:
-        """Stiffnesses and weight in the units of the frame."""
-        if self.section is not None:
-            made = cross_section(self.section).in_system(system)
-            axial = None if self.inextensible else made.EA
-            return Stiffness((made.GJ, made.EI_out, made.EI), axial, made.weight)
+    def bending_and_twist(self, section: SectionProperties | None) -> tuple[float, float, float]:
+        """GJ, EI_out and EI."""
+        if section is not None:
+            return section.GJ, section.EI_out, section.EI
         plane = 1.0 if self.EI is None else float(self.EI)
         aside = plane if self.EI_out is None else float(self.EI_out)
         twist = ROUND_TORSION * plane if self.GJ is None else float(self.GJ)
-        axial = None if self.inextensible or self.EA is None else float(self.EA)
-        return Stiffness((twist, aside, plane), axial, _number(self.weight))
-
-    def arc_length(self, chord: float, stiff: Stiffness) -> float:
-        """Length of an arc over a chord; InputError if no slender arc fits."""
-        gyration = 0.0 if stiff.EA is None else float(np.sqrt(min(stiff.strain[1:]) / stiff.EA))
-        return arc_length(self, float(self.curvature), chord, gyration)
+        return twist, aside, plane
 
     def axes(self, chord: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 3"]:
         """Tangent, normal and binormal, as columns, in the middle of a piece as drawn."""
@@ -177,17 +151,11 @@ class SpatialMember(Edge):
         given = super().data() | {"strains": list(self.strains)}
         if self.normal is not None:
             given["normal"] = [float(x) for x in self.normal]
-        if self.section is not None:
-            given["section"] = cross_section(self.section).data()
         hinged = {joint: self.hinge(joint) for joint in self.hinges}
         given["hinges"] = {
             joint: list(each) if isinstance(each, tuple) else each for joint, each in hinged.items()
         }
         return given
-
-
-def _number(given: Any) -> float | None:
-    return None if given is None else float(given)
 
 
 SpatialMemberSpec = Annotated[

@@ -26,7 +26,6 @@ from equimorph.structures.space_frame.member import (
     SpatialMemberSpec,
     SpatialSupport,
     SpatialSupportSpec,
-    Stiffness,
     spatial_support,
 )
 from equimorph.structures.unit_system import UnitSystem
@@ -57,22 +56,14 @@ class Body:
 class SpatialNetwork(AnyFrameNetwork):
     """Joints in their places, the pieces of members between them, and their supports.
 
-    owner: the member of each piece; made: the stiffness of each member.
+    owner: the member of each piece.
     """
 
     members: tuple[SpatialMember, ...]
     owner: Int[np.ndarray, " pieces"]
-    made: tuple[Stiffness, ...]
     supports: tuple[SpatialSupport, ...]
     axes_of_turns: ClassVar[int] = 3
     sizes_of_loads: ClassVar[tuple[int, ...]] = (3,)
-
-    @cached_property
-    def lengths(self) -> Float[np.ndarray, " pieces"]:
-        """Lengths of the pieces as drawn."""
-        chords = np.linalg.norm(self.chords, axis=1).tolist()
-        pairs = zip(self.owner.tolist(), chords, strict=True)
-        return np.array([self.members[m].arc_length(each, self.made[m]) for m, each in pairs])
 
     @cached_property
     def stretched(self) -> Float[np.ndarray, " pieces"]:
@@ -104,16 +95,6 @@ class SpatialNetwork(AnyFrameNetwork):
             if member.name == name:
                 return [(int(k), 1.0) for k in np.flatnonzero(self.owner == m)]
         return [self.place_of_edge(name)]
-
-    @property
-    def bending(self) -> float:
-        """Mean stiffness against bending about b: the unit of bending stiffnesses."""
-        return float(np.mean([each.strain[2] for each in self.made]))
-
-    @property
-    def weights(self) -> Float[np.ndarray, " pieces"]:
-        """Weights per length; 0 where none is given."""
-        return np.array([self.made[m].weight or 0.0 for m in self.owner.tolist()])
 
     @property
     def turning_places(self) -> int:
@@ -279,7 +260,7 @@ def spatial_network(
     for at, joint, given in supported_joints(supports, names):
         held[at] = spatial_support(joint, given, system)
     stiff = tuple(each.stiffness(system) for each in made)
-    result = SpatialNetwork(names, places, ends, made, owner, stiff, tuple(held))
+    result = SpatialNetwork(names, places, ends, made, stiff, owner, tuple(held))
     result.check()
     assert result.lengths.all()  # arcs that do not reach are refused here
     result.check_rotations()

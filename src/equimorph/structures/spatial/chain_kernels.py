@@ -7,7 +7,16 @@ import numpy as np
 
 from equimorph.linalg.compiled import njit
 from equimorph.linalg.kernels import INNER
-from equimorph.linalg.simd import absolute, load, spread, store, where_less
+from equimorph.linalg.simd import (
+    absolute,
+    load,
+    load2,
+    repeat2,
+    spread,
+    stack2,
+    store,
+    where_less,
+)
 from equimorph.structures.spatial.force_kernels import BORDER, COLUMN, FORCE, ROW
 from equimorph.structures.spatial.node_kernels import (
     COUNT,
@@ -170,43 +179,46 @@ def note_closures(small, system, extremes):
 
 @njit(**INNER)
 def restore_vertex(v, last, node, after, vertices, ties, small, turns):
-    """Back-substitute step and tangent at a vertex; turns: six rows a node."""
+    """Back-substitute step and tangent at a vertex; turns: six rows a node, in pairs."""
     for k in range(2, -1, -1):
         row = (3 * v + k) * SHARES
-        step, turn = reduced(vertices, row + 3, small)
+        pair = reduced(vertices, row + 3, small)
         for j in range(k + 1, 3):
-            factor, at = load(vertices, row + j), 6 * node + 2 * j
-            step, turn = step - factor * load(turns, at), turn - factor * load(turns, at + 1)
+            pair = pair - repeat2(load(vertices, row + j)) * load2(turns, 6 * node + 2 * j)
         if v < last:
             for j in range(3):
-                factor, at = load(ties, 9 * v + 3 * k + j), 6 * after + 2 * j
-                step, turn = step - factor * load(turns, at), turn - factor * load(turns, at + 1)
-        inverse = load(vertices, row + k)
-        store(turns, 6 * node + 2 * k, step * inverse)
-        store(turns, 6 * node + 2 * k + 1, turn * inverse)
+                tie = repeat2(load(ties, 9 * v + 3 * k + j))
+                pair = pair - tie * load2(turns, 6 * after + 2 * j)
+        store(turns, 6 * node + 2 * k, pair * repeat2(load(vertices, row + k)))
 
 
 @njit(**INNER)
 def reduced(rows, at, small):
-    """Right-hand sides of step and tangent from reduced border columns."""
-    step, turn = load(rows, at + FORCE), spread(0.0)
+    """Right-hand sides of step and tangent, a pair of rows, from reduced border columns."""
+    pair = stack2(load(rows, at + FORCE), spread(0.0))
     for c in range(4):
         column = load(rows, at + (c if c < 3 else COLUMN))
-        step = step - column * load(small, c * SYSTEM + 4)
-        turn = turn - column * load(small, c * SYSTEM + 5)
-    return step, turn
+        pair = pair - repeat2(column) * load2(small, c * SYSTEM + 4)
+    return pair
 
 
 @njit(**INNER)
 def restore_inner(inner, size, first, places, width, matrix, base, pivots, at, small, turns):
     """Back-substitute step and tangent at the inner nodes of an element."""
-    for k in range(inner - 1, -1, -1):
-        row = base + k * width
-        step, turn = reduced(matrix, row + size, small)
-        for j in range(k + 1, size):
-            to = 6 * (first + places[j // 3]) + 2 * (j % 3)
-            factor = load(matrix, row + j)
-            step, turn = step - factor * load(turns, to), turn - factor * load(turns, to + 1)
-        to, inverse = 6 * (first + places[k // 3]) + 2 * (k % 3), load(pivots, at + k)
-        store(turns, to, step * inverse)
-        store(turns, to + 1, turn * inverse)
+    for i in range(inner - 3, -1, -3):
+        row = base + i * width
+        below, last = row + width, row + 2 * width
+        a, b = reduced(matrix, row + size, small), reduced(matrix, below + size, small)
+        c = reduced(matrix, last + size, small)
+        for j in range(i + 3, size):
+            turn = load2(turns, 6 * (first + places[j // 3]) + 2 * (j % 3))
+            a = a - repeat2(load(matrix, row + j)) * turn
+            b = b - repeat2(load(matrix, below + j)) * turn
+            c = c - repeat2(load(matrix, last + j)) * turn
+        c = c * repeat2(load(pivots, at + i + 2))
+        b = (b - repeat2(load(matrix, below + i + 2)) * c) * repeat2(load(pivots, at + i + 1))
+        a = a - repeat2(load(matrix, row + i + 1)) * b - repeat2(load(matrix, row + i + 2)) * c
+        to = 6 * (first + places[i // 3])
+        store(turns, to, a * repeat2(load(pivots, at + i)))
+        store(turns, to + 2, b)
+        store(turns, to + 4, c)

@@ -1,4 +1,4 @@
-"""Compiled kernels of the forces on the cross-sections of a rod in space, eight lanes at a time."""
+"""Compiled kernels of the forces on cross-sections of a rod in space, vector by vector of lanes."""
 
 from equimorph.linalg.compiled import njit
 from equimorph.linalg.kernels import INNER

@@ -1,4 +1,4 @@
-"""Compiled kernels of jets of quaternions, eight lanes at a time; see `quaternions`.
+"""Compiled kernels of jets of quaternions, a vector of lanes at a time; see `quaternions`.
 
 A jet of `parts` vectors has the rows of part 0, then of part 1, and so on. `pairs` lists (part of a
 product, part of the first factor, part of the second); all products add to what is there.

@@ -113,6 +113,17 @@ class SpatialLagrangian(RodMechanics):
         out[0, ..., 0] += 1.0
         return np.asarray(out)
 
+    @property
+    def is_extensible(self) -> bool:
+        """Whether the axis stretches."""
+        return bool(self.model.softness[..., 0].any())
+
+    def shortenings(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes points"]:
+        """Elastic shortenings of the axis at the nodes of every element."""
+        q, y = self.rotations(z, p)[None], self.scalars(z, p)[None]
+        stretch = self.stretches(self.section_forces(q, y)[1], y)[0, ..., 0]
+        return np.asarray(1.0 - stretch.reshape(len(z), self.model.softness[..., 0].size))
+
     def section_moments(self, strain: Jet, y: Jet) -> Jet:
         """Moments on the axes of the cross-section."""
         out = self.model.stiffness * strain

@@ -1,4 +1,4 @@
-"""Compiled bordered solves with F_z of a rod in space, eight lanes at a time.
+"""Compiled bordered solves with F_z of a rod in space, a vector of lanes at a time.
 
 The elimination is that of `step_kernels`, with any columns: those of the closures come first, then
 rows and columns of the border, and the right-hand sides. Columns by unknowns of a node are turned
@@ -255,7 +255,7 @@ def solve_bordered_lanes(
         places, slopes, weights, stiff, moments, moment_picks, torsion, torsion_picks, forces,
         force_picks, tension, tension_picks, softness,
     )  # fmt: skip
-    work = element_work(order, width, gradient)
+    work = element_work(order, gradient)
     matrix, lower = work_rows((elements * size + 1) * width + 8), work_rows((size + 1) * width)
     pivots, vertices = work_rows(elements * inner), work_rows((elements + 1) * 3 * shares)
     ties, products = work_rows(elements * 9), work_rows(left * border)

@@ -1,4 +1,4 @@
-"""Compiled Newton step of a rod in space, eight lanes at a time.
+"""Compiled Newton step of a rod in space, a vector of lanes at a time.
 
 Lengths of quaternions are eliminated at the nodes (`node_kernels`), inner nodes in their elements
 (`element_kernels`), vertices along the chain (`chain_kernels`); what remains are three closures
@@ -87,17 +87,15 @@ def clear_block(vertices, products, extremes):
 
 
 @njit(**FLAGS)
-def element_work(order, width, gradient):
+def element_work(order, gradient):
     """Work arrays of `assemble_element`."""
-    jacobian, scaled = work_rows((3 * order + 1) * width), work_rows((3 * order + 1) * width)
-    jacobian[:], scaled[:] = 0.0, 0.0
     more = (
         work_rows(9), work_rows(3), work_rows(3), work_rows(3), work_rows(3), work_rows(3),
         work_rows(3), work_rows(3), work_rows(3), work_rows(3),
     )  # fmt: skip
     return (
-        work_rows(4 * order * order), work_rows(4 * order), work_rows(order), jacobian, scaled,
-        gradient, work_rows(3), more,
+        work_rows(4 * order * order), work_rows(4 * order), work_rows(order),
+        work_rows(9 * order * order), gradient, work_rows(3), more,
     )  # fmt: skip
 
 
@@ -131,7 +129,7 @@ def advance_lanes(
         places, slopes, weights, stiff, moments, moment_picks, torsion, torsion_picks, forces,
         force_picks, tension, tension_picks, softness,
     )  # fmt: skip
-    work = element_work(order, width, gradient)
+    work = element_work(order, gradient)
     lowered = work_rows(1)
     lowered[:] = 0.0
     matrix, lower = work_rows((elements * size + 1) * width + 8), work_rows((size + 1) * width)

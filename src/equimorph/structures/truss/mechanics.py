@@ -19,6 +19,7 @@ from equimorph.structures.any_network import (
     is_symmetry,
     parameter_exchange,
 )
+from equimorph.structures.collapse import COLLAPSED
 from equimorph.structures.contract import Growth, Symmetry
 from equimorph.structures.discrete import along_corners, linearise
 from equimorph.structures.equations import Direction, Enclosed
@@ -28,9 +29,6 @@ from equimorph.structures.unit_system import UnitSystem
 
 BarValues = Float[np.ndarray, "lanes bars"]
 
-COLLAPSED = 0.99
-"""Shortening of a bar, relative to its rest length, beyond which engineering strain says nothing:
-the energy has a kink where the joints meet, and sheets end there."""
 SMALLEST = 0.02
 """Least size of guesses, relative to the truss."""
 

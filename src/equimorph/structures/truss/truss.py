@@ -10,7 +10,8 @@ from equimorph.argument_checks import check_arguments
 from equimorph.array_types import Float
 from equimorph.arrays import Lanes, Parameters, Values, Velocity
 from equimorph.errors import InputError
-from equimorph.model import Constraint, Descriptor, remember_call
+from equimorph.model import Descriptor, remember_call
+from equimorph.structures.collapse import Shortening
 from equimorph.structures.contract import Product, Symmetry
 from equimorph.structures.discrete import correct_at_parameters
 from equimorph.structures.network import (
@@ -18,7 +19,7 @@ from equimorph.structures.network import (
     check_parameter_names,
     direction_of_mechanism,
 )
-from equimorph.structures.truss.mechanics import COLLAPSED, BarValues, TrussMechanics, symmetries
+from equimorph.structures.truss.mechanics import BarValues, TrussMechanics, symmetries
 from equimorph.structures.truss.network import (
     AXES,
     BarSpec,
@@ -47,7 +48,7 @@ TINY = 1e-300
 """In place of zero in denominators."""
 
 
-class Truss(TrussMechanics):
+class Truss(TrussMechanics, Shortening):
     """Pin-jointed elastic bars in the plane or in space, with displacements of any size.
 
     Each bar has the energy ½ EA l₀ ε² with its rest length l₀ and engineering strain ε = l/l₀ − 1
@@ -318,19 +319,9 @@ class Truss(TrussMechanics):
         return self._make("max_utilisation", "1", value, "max U")
 
     @property
-    @remember_call
-    def max_shortening(self) -> Descriptor:
-        """Largest shortening of a bar relative to its rest length, 1 − l/l₀."""
-
-        def value(z: Lanes, p: Parameters) -> Values:
-            return np.asarray(self.shortenings(z, p).max(axis=1))
-
-        return self._make("max_shortening", "1", value, "max(1 − l/l₀)")
-
-    @property
-    def validity(self) -> tuple[Constraint, ...]:
-        """With engineering strain no bar may collapse: ``max_shortening <= 0.99``."""
-        return () if self.energies.green else (self.max_shortening <= COLLAPSED,)
+    def may_collapse(self) -> bool:
+        """Green strain holds at length zero, too."""
+        return not self.energies.green
 
     @check_arguments
     def displacement(self, joint: str, axis: str) -> Descriptor:

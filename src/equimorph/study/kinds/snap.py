@@ -99,7 +99,7 @@ class SnapGraphKind(Kind[Snaps]):
         text = question.section.descriptor
         if text is None:
             return question.structure.elevation
-        return descriptor_at(question.structure, text, f"{question.key}.descriptor")
+        return descriptor_at(question.ground, text, f"{question.key}.descriptor")
 
     def answer(self, question: Question, arguments: Arguments) -> Snaps:
         """Follow the snaps; only the ends of their ways are kept."""

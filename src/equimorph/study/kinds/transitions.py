@@ -76,7 +76,7 @@ class BarriersKind(Kind[Field]):
 
     def answer(self, question: Question, arguments: Arguments) -> Field:
         """Barriers over the box, and all that is known of the largest one at a vertex."""
-        eset, field = arguments.eset, barriers(**arguments.of(barriers))
+        eset, field = arguments.eset, question.ground.field
         least = field.least() if len(eset.names) == 2 else np.zeros((0, 0))
         shown = np.where(np.isfinite(least), least, NOTHING)
         known = np.where(

@@ -156,7 +156,7 @@ def pass_piece(
 
     def follow(made: Structure, guess: State) -> Piece | None:
         near = SetPoints(guess.z[None], guess.p[None], rows)
-        found = passes_near(question.programme(made), near, reach, point)
+        (found,) = passes_near(question.programme(made), near, np.array([reach]), point)
         return pass_piece(question, made, found[0], reach) if found else None
 
     tangents = Carried(*split_step(setting, np.ascontiguousarray(point.frames[0])))

@@ -43,6 +43,12 @@ class _Active:
     branches: tuple[int, ...]
     bounds: tuple[int, ...]
 
+    @classmethod
+    def like(cls, known: CriticalPoint, some: Some) -> "_Active":
+        """Those of a known pass; bounds are counted among some."""
+        own, bounds = known.binding
+        return cls(tuple(own.tolist()), tuple(np.searchsorted(some, bounds).tolist()))
+
     def newton(self, expansion: Expansion, k: int) -> QuadraticStep | None:
         """Newton's step at a point; second derivatives are weighed by multipliers of least squares.
 
@@ -66,70 +72,111 @@ class _Active:
         return QuadraticStep(x[0, :d], weights, multipliers) if regular[0] else None
 
 
+@dataclass(frozen=True)
+class _Lane:
+    """Number of the point from which a pass is sought, and what is held there."""
+
+    start: int
+    active: _Active
+
+
 def passes_near(
-    programme: Programme, start: SetPoints, reach: float, like: CriticalPoint | None = None
-) -> list[CriticalPoint]:
-    """Passes near a point, the nearest first.
+    programme: Programme, starts: SetPoints, reach: Values, like: CriticalPoint | None = None
+) -> list[list[CriticalPoint]]:
+    """Passes near each of some points, the nearest first; all are sought in one batch.
+
+    Bounds that cannot be active there are left out, and examined at the passes that are found.
 
     Parameters
     ----------
     programme
         Objective and bounds.
-    start
-        One point.
+    starts
+        The points.
     reach
-        Size of the cells around it, in the metric and scaled parameters.
+        Size of the cells around each of them, in the metric and scaled parameters.
     like
         A pass of a similar problem: the same functions are then held, right or not.
     """
-    start, found = project_onto_set(programme.setting, start.z, start.p, start.rows)
-    if not found[0]:
-        return []
-    first = Iterate.at(programme, start)
-    if like is None:
-        lanes = list(islice(_possible(first.expansion, AROUND * reach), MOST))
-    else:
-        lanes = [_Active(*(tuple(each.tolist()) for each in like.binding))]
-    at, ended = first.take(np.zeros(len(lanes), int)), list[CriticalPoint]()
-    last = np.full(len(lanes), np.inf)
+    starts, found = project_onto_set(programme.setting, starts.z, starts.p, starts.rows)
+    good = np.flatnonzero(found)
+    if len(good) == 0:
+        return [[] for _ in found]
+    first = Iterate.at(programme, starts.take(good))
+    far = AROUND * reach[good]
+    able = [_near_bounds(first.expansion, k, each) for k, each in enumerate(far.tolist())]
+    if like is not None:
+        able.append(like.binding[1])
+    some = np.unique(np.concatenate(able))
+    few, first = programme.with_bounds(some), first.with_bounds(some)
+    lanes = [
+        _Lane(k, each)
+        for k in range(len(good))
+        for each in (
+            [_Active.like(like, some)]
+            if like is not None
+            else islice(_possible(first.expansion, k, float(far[k])), MOST)
+        )
+    ]
+    ended = list[list[CriticalPoint]]([] for _ in found)
+    for lane, each in _newton(few, first, lanes, reach[good]):
+        if like is not None or _holds(few, each):
+            full = each.under(programme, some)
+            if like is not None or _holds(programme, full):
+                ended[good[lane.start]].append(full)
+    return [
+        sorted(passes, key=lambda at: float(_distances(programme, at.point, start)[0]))
+        for passes, start in ((own, starts.take(np.array([k]))) for k, own in enumerate(ended))
+    ]
+
+
+def _newton(
+    programme: Programme, first: Iterate, lanes: list[_Lane], reach: Values
+) -> Iterator[tuple[_Lane, CriticalPoint]]:
+    """Newton's method from the points where lanes start, until steps are round-off."""
+    own = np.array([each.start for each in lanes], int)
+    at, starts, last = first.take(own), first.points, np.full(len(lanes), np.inf)
     for _ in range(ITERATIONS):
-        newton = [each.newton(at.expansion, k) for k, each in enumerate(lanes)]
+        newton = [each.active.newton(at.expansion, k) for k, each in enumerate(lanes)]
         steps = {k: each for k, each in enumerate(newton) if each is not None}
         size = {k: float(np.linalg.norm(each.step)) for k, each in steps.items()}
         still = [k for k, each in size.items() if last[k] <= STILL or each <= ROUND_OFF]
-        ended += [at.minimum(k, steps[k], converged=True) for k in still]
+        yield from ((lanes[k], at.minimum(k, steps[k], converged=True)) for k in still)
         going = np.setdiff1d(list(steps), still).astype(int)
         if len(going) == 0:
-            break
+            return
+        own, last = own[going], np.array([size[k] for k in going.tolist()])
         moves = np.array([steps[k].step for k in going.tolist()])
-        last = np.array([size[k] for k in going.tolist()])
-        moves *= np.minimum(1.0, reach / last)[:, None]
-        own = at.points.take(going)
-        moved = step_along(programme.setting, own, at.frames[going], moves)
-        here, near = project_onto_set(programme.setting, *moved, own.rows)
-        near &= _distances(programme, here, start) <= AROUND * reach
-        here, lanes = here.take(np.flatnonzero(near)), [lanes[k] for k in going[near].tolist()]
-        last = last[near]
+        moves *= np.minimum(1.0, reach[own] / last)[:, None]
+        before = at.points.take(going)
+        moved = step_along(programme.setting, before, at.frames[going], moves)
+        here, near = project_onto_set(programme.setting, *moved, before.rows)
+        near &= _distances(programme, here, starts.take(own)) <= AROUND * reach[own]
+        lanes, here = [lanes[k] for k in going[near].tolist()], here.take(np.flatnonzero(near))
+        last, own = last[near], own[near]
         if not lanes:
-            break
+            return
         at = Iterate.at(programme, here)
-    passes = [each for each in ended if like is not None or _holds(programme, each)]
-    return sorted(passes, key=lambda each: float(_distances(programme, each.point, start)[0]))
 
 
-def _possible(expansion: Expansion, far: float) -> Iterator[_Active]:
-    """Sets of functions that may be active within a distance, the smallest first.
+def _possible(expansion: Expansion, k: int, far: float) -> Iterator[_Active]:
+    """Sets of functions that may be active within a distance of point k, the smallest first.
 
     One direction is left in which the pass leads down.
     """
-    f, slope, d = expansion.f[0], expansion.f_slope[0], expansion.f_slope.shape[2]
+    f, slope, d = expansion.f[k], expansion.f_slope[k], expansion.f_slope.shape[2]
     apart = np.linalg.norm(slope - slope[f.argmax()], axis=1)
     branches = _within(f.max() - f, apart, far)
-    bounds = _within(np.abs(expansion.g[0]), np.linalg.norm(expansion.g_slope[0], axis=1), far)
+    bounds = _near_bounds(expansion, k, far)
     for size in range(d):
         for held in range(size + 1):
             for own in combinations(branches.tolist(), size - held + 1):
                 yield from (_Active(own, rows) for rows in combinations(bounds.tolist(), held))
+
+
+def _near_bounds(expansion: Expansion, k: int, far: float) -> Some:
+    """Bounds that may be active within a distance of point k, the nearest first."""
+    return _within(np.abs(expansion.g[k]), np.linalg.norm(expansion.g_slope[k], axis=1), far)
 
 
 def _within(gap: Values, slope: Values, far: float) -> Some:
@@ -155,5 +202,5 @@ def _holds(programme: Programme, found: CriticalPoint) -> bool:
     level = e.f[0, own].min()
     signs = min(answer.weights.min(), answer.multipliers.min(initial=0.0)) >= -NEGATIVE
     room = FEASIBLE * (1.0 + abs(level))
-    inside = e.g.max() <= FEASIBLE and e.f.max() <= level + room
+    inside = e.g.max(initial=-np.inf) <= FEASIBLE and e.f.max() <= level + room
     return bool(down == 1 and (stable or on_edge) and signs and inside)

@@ -1,13 +1,13 @@
 """An optimisation problem on an equilibrium set: what is minimised, under which constraints."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
 
 import numpy as np
 
 from equimorph.array_types import Float
-from equimorph.arrays import Flags, Frames, Lanes, Parameters, Values
+from equimorph.arrays import Flags, Frames, Lanes, Parameters, Some, Values
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.geometry.setting import Setting
 from equimorph.manifold.queries.nearest import SetPoints
@@ -121,6 +121,11 @@ class Expansion:
     g_bend: Float[np.ndarray, "lanes k d d"]
     known: Flags
 
+    def with_bounds(self, some: Some) -> "Expansion":
+        """The same with some of the bounds g."""
+        g, slope, bend = (each[:, some] for each in (self.g, self.g_slope, self.g_bend))
+        return replace(self, g=g, g_slope=slope, g_bend=bend)
+
     def bend(self, k: int, answer: QuadraticStep) -> Float[np.ndarray, "d d"]:
         """Second derivatives, at one of the points, of the Lagrangian with given multipliers."""
         out = np.einsum("m,mij->ij", answer.weights, self.f_bend[k])
@@ -165,10 +170,14 @@ class Programme:
         """Constraints and sides of the box."""
         return (*self.constraints, *self.bounds)
 
+    def with_bounds(self, some: Some) -> "Programme":
+        """The same with some of all bounds."""
+        return replace(self, bounds=(), constraints=tuple(self.all[k] for k in some.tolist()))
+
     def excess(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes k"]:
         """Excess over all bounds, relative to these."""
         each = [c.excess(z, p) / c.size for c in self.all]
-        return np.stack(each, axis=1)
+        return np.stack(each, axis=1) if each else np.zeros((len(z), 0))
 
     def expand(self, at: SetPoints, frames: Frames) -> Expansion:
         """Values, first and second derivatives along orthonormal tangents.

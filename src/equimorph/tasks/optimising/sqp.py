@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from equimorph.array_types import Float, Int
-from equimorph.arrays import Frames, ItemFlags, Items
+from equimorph.arrays import Frames, ItemFlags, Items, Some
 from equimorph.manifold.geometry.setting import Setting, embed
 from equimorph.manifold.queries.nearest import SetPoints
 from equimorph.structures import States
@@ -62,6 +62,16 @@ class CriticalPoint:
         """Functions and bounds whose multipliers are not zero."""
         return np.flatnonzero(self.answer.weights), np.flatnonzero(self.answer.multipliers)
 
+    def under(self, programme: Programme, some: Some) -> "CriticalPoint":
+        """The same with all bounds of a programme, of which some were known so far."""
+        multipliers = np.zeros(len(programme.all))
+        multipliers[some] = self.answer.multipliers
+        full = programme.expand(self.point, self.frames)
+        bounds = {"g": full.g, "g_slope": full.g_slope, "g_bend": full.g_bend}
+        expansion = replace(self.expansion, **bounds)
+        answer = replace(self.answer, multipliers=multipliers)
+        return replace(self, expansion=expansion, answer=answer)
+
     def beside(self, setting: Setting, steps: Float[np.ndarray, "n d"]) -> tuple[States, ItemFlags]:
         """States of the set above steps along its tangents, and which of them were found."""
         lanes = np.zeros(len(steps), int)
@@ -101,6 +111,10 @@ class Iterate:
         """Some of the lanes."""
         expansion = Expansion(*(column[lanes] for column in vars(self.expansion).values()))
         return Iterate(self.points.take(lanes), self.frames[lanes], expansion)
+
+    def with_bounds(self, some: Some) -> "Iterate":
+        """The same with some of the bounds."""
+        return replace(self, expansion=self.expansion.with_bounds(some))
 
     def minimum(self, k: int, answer: QuadraticStep, converged: bool) -> CriticalPoint:
         """Lane `k` as a point from which no step is made."""

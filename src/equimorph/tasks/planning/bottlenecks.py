@@ -12,12 +12,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from equimorph.array_types import Float
-from equimorph.arrays import ItemFlags, Items
+from equimorph.arrays import ItemFlags, Items, Some
 from equimorph.equilibria import settle
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.complex.kept_sets import from_cache
 from equimorph.manifold.geometry.setting import embed
-from equimorph.manifold.queries.nearest import SetPoints, points_at_vertices
+from equimorph.manifold.queries.nearest import SetPoints, cells_around, points_at_vertices
 from equimorph.model import Constraint
 from equimorph.structures import State, States, join_states
 from equimorph.tasks.optimising.certificates import certificate, curvatures
@@ -107,6 +107,16 @@ def find_bottleneck(
     return _Search(eset, ends, extreme, bounds, programme).run()
 
 
+@dataclass(frozen=True)
+class _Spot:
+    """Where a facet opens, the size of the cells around it, and the facets among these."""
+
+    facet: int
+    start: SetPoints
+    reach: float
+    facets: Items
+
+
 class _Search:
     """The lowest way over the facets, some of which have exact levels already."""
 
@@ -127,6 +137,7 @@ class _Search:
         self.ceiling = cells[links].max(axis=1)
         self.examined, self.bent = np.zeros(len(links), bool), False
         self.passes: dict[int, tuple[CriticalPoint, float]] = {}
+        self.sought: dict[int, tuple[_Spot, list[CriticalPoint]]] = {}
         self.at_ends = [
             float(programme.objective.values(each.z[None], each.p[None])[0]) for each in ends
         ]
@@ -137,7 +148,7 @@ class _Search:
         way, below, top = None, 0, max(self.at_ends)
         for _ in range(ROUNDS):
             way = self.filtration.way(first, last)
-            facet = None if way is None else self._doubtful(way, top)
+            facet = None if way is None else self._doubtful(way, top, self.examined)
             if way is None or facet is None:
                 break
             level = float(self.filtration.level[facet])
@@ -147,15 +158,15 @@ class _Search:
             if level > top and self.programme.objective.kinked and not self.bent:
                 self._bend(top, level)
             else:
-                self._make_exact(facet, way)
+                self._make_exact(facet, way, top)
         return None if way is None else self._answer(way, top)
 
-    def _doubtful(self, way: Items, top: float) -> int | None:
+    def _doubtful(self, way: Some, top: float, examined: ItemFlags) -> int | None:
         """Highest facet of a way that may be higher than the peak as it is known; else None."""
         level = self.filtration.level[way]
         highest = max(top, float(level.max(initial=-np.inf)))
         able = (level == highest) | (self.ceiling[way] > highest)
-        some = way[able & ~self.examined[way]]
+        some = way[able & ~examined[way]]
         return int(some[self.filtration.level[some].argmax()]) if len(some) else None
 
     def _bend(self, top: float, level: float) -> None:
@@ -171,20 +182,44 @@ class _Search:
             able[able] = np.ptp(places, axis=1) > JUMP
         self.filtration = self.filtration.with_kinks(np.flatnonzero(able))
 
-    def _make_exact(self, facet: int, way: Items) -> None:
+    def _make_exact(self, facet: int, way: Items, top: float) -> None:
         """Seek the pass at a facet; its value replaces the levels around it that it disproves."""
+        if facet not in self.sought:
+            self._seek(self._next(facet, way, top))
+        spot, passes = self.sought[facet]
+        self.examined[spot.facets] = True
+        for found in passes:
+            if self._replace_levels(facet, found, spot.reach, way):
+                return
+
+    def _seek(self, spots: "list[_Spot]") -> None:
+        """Passes near some facets, in one batch."""
+        starts = SetPoints.concatenate([each.start for each in spots])
+        passes = passes_near(self.programme, starts, np.array([each.reach for each in spots]))
+        self.sought |= {each.facet: (each, own) for each, own in zip(spots, passes, strict=True)}
+
+    def _next(self, facet: int, way: Items, top: float) -> "list[_Spot]":
+        """A facet; not above the ends, also those that follow it if there is no pass."""
+        spots, examined = [self._spot(facet)], self.examined.copy()
+        while self.filtration.level[facet] <= top and len(spots) < BELOW_ENDS:
+            examined[spots[-1].facets] = True
+            further = self._doubtful(way, top, examined)
+            if further is None:
+                break
+            spots.append(self._spot(further))
+        return spots
+
+    def _spot(self, facet: int) -> "_Spot":
+        """Where a facet opens, and what lies around it."""
         eset, filtration = self.eset, self.filtration
         corners, shares = filtration.passages.facets[facet], filtration.shares[facet]
-        around = np.unique(eset.cells[np.isin(eset.cells, corners).any(axis=1)])
+        around = np.unique(eset.cells[cells_around(eset, corners)])
         middle = shares @ self._places[corners]
         reach = float(np.linalg.norm(self._places[around] - middle, axis=1).max())
         rows = points_at_vertices(eset, corners[[shares.argmax()]]).rows
         z, p = ((shares @ each[corners])[None] for each in (eset.points.z, eset.points.p))
-        self.examined |= self._near(middle, reach)
-        self.examined[facet] = True
-        for found in passes_near(self.programme, SetPoints(z, p, rows), reach):
-            if self._replace_levels(facet, found, reach, way):
-                return
+        facets = np.append(self._near(middle, reach), facet)
+        return _Spot(facet, SetPoints(z, p, rows), reach, facets)
 
     def _replace_levels(self, facet: int, found: CriticalPoint, reach: float, way: Items) -> bool:
         """Give the value of a pass to levels around it, if their errors explain the difference."""
@@ -196,11 +231,12 @@ class _Search:
             return False
         near = self._near(here, AROUND * reach)
         low, high = sorted((value, level[facet]))
-        chosen = near & (level >= low) & (level <= high)
-        chosen[facet] = True
-        self.examined |= near
-        self.passes |= dict.fromkeys(np.flatnonzero(chosen).tolist(), (found, reach))
-        self.filtration = replace(self.filtration, level=np.where(chosen, value, level))
+        chosen = np.append(near[(level[near] >= low) & (level[near] <= high)], facet)
+        self.examined[near] = True
+        self.passes |= dict.fromkeys(chosen.tolist(), (found, reach))
+        new = level.copy()
+        new[chosen] = value
+        self.filtration = replace(self.filtration, level=new)
         return True
 
     def _passes_below(self, facet: int, way: Items, found: CriticalPoint) -> bool:
@@ -231,13 +267,13 @@ class _Search:
 
         It knows the shapes of active bounds, too.
         """
-        gap = self._places - embed(self.eset.setting, found.point.z, found.point.p)[0]
-        stable = np.isfinite(stable_values(self.eset, self.extreme.descriptor))
-        some = np.flatnonzero((np.linalg.norm(gap, axis=1) <= reach) & stable)
-        near = self.eset.points[some]
+        here = embed(self.eset.setting, found.point.z, found.point.p)[0]
+        some = self._vertices_near(here, reach)
+        some = some[np.isfinite(stable_values(self.eset, self.extreme.descriptor)[some])]
+        near, gap = self.eset.points[some], self._places[some] - here
         values = self.programme.objective.values(near.z, near.p)
         values += self.programme.excess(near.z, near.p) @ found.answer.multipliers
-        flat = np.column_stack([np.ones(len(some)), gap[some] @ found.point.rows[0].T])
+        flat = np.column_stack([np.ones(len(some)), gap @ found.point.rows[0].T])
         plane, *_ = np.linalg.lstsq(flat, values, rcond=None)
         off = np.append(values - flat @ plane, float(found.expansion.f[0].max()) - plane[0])
         return float(np.abs(off).max())
@@ -251,10 +287,18 @@ class _Search:
         )
         return np.asarray(found)
 
-    def _near(self, place: Float[np.ndarray, " coordinates"], reach: float) -> ItemFlags:
+    def _near(self, place: Float[np.ndarray, " coordinates"], reach: float) -> Items:
         """Facets with all vertices within a distance."""
-        near = np.linalg.norm(self._places - place, axis=1) <= reach
-        return np.asarray(near[self.filtration.passages.facets].all(axis=1))
+        near = np.zeros(len(self.eset.points), bool)
+        near[self._vertices_near(place, reach)] = True
+        return np.flatnonzero(near[self.filtration.passages.facets].all(axis=1))
+
+    def _vertices_near(self, place: Float[np.ndarray, " coordinates"], reach: float) -> Items:
+        """Vertices within a distance, which their parameters are, too."""
+        d = len(self.eset.names)
+        able = (np.abs(self._places[:, -d:] - place[-d:]) <= reach).all(axis=1)
+        some = np.flatnonzero(able)
+        return np.asarray(some[np.linalg.norm(self._places[some] - place, axis=1) <= reach])
 
     def _answer(self, way: Items, top: float) -> Passing:
         """The pass that is highest on the way, or the end that is higher."""
@@ -284,7 +328,9 @@ class _Search:
         z, p = (np.einsum("fd,fdi->fi", shares, each[facets]) for each in (points.z, points.p))
         exact = settle(points.structure, z, p)
         states = States(points.structure, exact.z, p)
-        good = exact.found & (bound.excess(exact.z, p) <= 0.0)
+        good = exact.found
+        high = np.flatnonzero(good & (self.ceiling[way] > self.extreme.sign * bound.bound))
+        good[high] = bound.excess(exact.z[high], p[high]) <= 0.0
         good[good] = states[good].index == 0
         at = int(np.flatnonzero(way == facet)[0]) if len(way) else 0
         number = np.arange(len(way))

@@ -7,13 +7,14 @@ tree of the cells.
 """
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import combinations
 
 import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import breadth_first_order, minimum_spanning_tree
 
-from equimorph.array_types import Float
+from equimorph.array_types import Float, Int
 from equimorph.arrays import Facets, Items, ItemValues, Pairs, Some
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.complex.kept_sets import from_cache
@@ -34,6 +35,22 @@ class Passages:
     cells: Some
     links: Pairs
     facets: Facets
+
+    def between(self, path: Items) -> Int[np.ndarray, " steps"]:
+        """Numbers of the links between one cell of a path and the next."""
+        steps = np.sort(np.stack([path[1:], path[:-1]], axis=1), axis=1)
+        codes, order = self._codes
+        return np.asarray(order[np.searchsorted(codes, self._code(steps))])
+
+    @cached_property
+    def _codes(self) -> tuple[Items, Items]:
+        """One number for each link, increasing, and the links in this order."""
+        codes = self._code(np.sort(self.links, axis=1))
+        order = np.argsort(codes)
+        return codes[order], order
+
+    def _code(self, pairs: Pairs) -> Items:
+        return np.asarray(pairs @ np.array([len(self.cells), 1]))
 
 
 def passages_of(eset: EquilibriumSet) -> Passages:
@@ -137,11 +154,7 @@ class Filtration:
         path = walk_back(before, start, goal) if goal != start else np.array([start])
         if path is None:
             return None
-        steps = np.sort(np.stack([path[1:], path[:-1]], axis=1), axis=1)
-        code = np.sort(links[passable], axis=1) @ np.array([count, 1])
-        order = np.argsort(code)
-        found = np.searchsorted(code[order], steps @ np.array([count, 1]))
-        return np.asarray(passable[order[found]])
+        return self.passages.between(path)
 
 
 def _crossing_lines(known: Branches, first: Items, second: Items) -> Float[np.ndarray, "n 2 2"]:

@@ -41,8 +41,9 @@ def explained_refusal(
     relaxed = tuple(_relaxations(eset, ends, demands))
     nearest = _nearest(eset, ends, demands)
     if nearest is not None:
-        route = free_route(eset, (ends[0], nearest), demands, monitor)
-        if route is not None and route.arrived:
+        stays = np.array_equal(nearest.p, ends[0].p) and np.allclose(nearest.z, ends[0].z)
+        route = None if stays else free_route(eset, (ends[0], nearest), demands, monitor)
+        if stays or (route is not None and route.arrived):
             refused = replace(refused, nearest=nearest)
     return replace(refused, relaxations=relaxed)
 

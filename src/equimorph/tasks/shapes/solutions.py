@@ -190,7 +190,7 @@ def solve_shape(
 @check_arguments
 def solve_shapes(
     eset: EquilibriumSet,
-    targets: Mapping[Descriptor, Float[np.ndarray, " many"]],
+    targets: Mapping[Descriptor, Sequence[float] | Float[np.ndarray, " many"]],
     *,
     within: Sequence[Constraint] = (),
     start: State | None = None,
@@ -242,7 +242,8 @@ def solve_shapes(
 
 
 def _numbers(
-    eset: EquilibriumSet, targets: Mapping[Descriptor, Float[np.ndarray, " many"]]
+    eset: EquilibriumSet,
+    targets: Mapping[Descriptor, Sequence[float] | Float[np.ndarray, " many"]],
 ) -> Float[np.ndarray, "many k"]:
     if not targets:
         raise InputError("`targets` must give at least one descriptor; got none.")
