@@ -1,5 +1,6 @@
 """Members of frames, in the plane or in space: what stiffness they have by themselves."""
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
@@ -28,7 +29,7 @@ class Stiffness:
     fibres: Fibres | None
 
 
-class AnyMember(Edge):
+class AnyMember(Edge, ABC):
     """A member with its section or its stiffnesses: a frozen dataclass."""
 
     edge: ClassVar[str] = "member"
@@ -55,9 +56,9 @@ class AnyMember(Edge):
                 f"gives it; got {getattr(self, twice[0])!r}."
             )
 
+    @abstractmethod
     def bending_and_twist(self, section: SectionProperties | None) -> tuple[float, ...]:
         """Stiffnesses of a section, or those given, in the order of `Stiffness.strain`."""
-        raise NotImplementedError
 
     def stiffness(self, system: UnitSystem) -> Stiffness:
         """Stiffnesses and weight in the units of the frame."""
