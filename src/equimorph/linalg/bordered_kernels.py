@@ -211,7 +211,7 @@ def count_border(small, m, width, square, extremes):
         for a in range(m):
             for b in range(m):
                 square[a, b] = small[a * width + b, lane]
-        extremes[0, lane] += factor_symmetric(square)
+        extremes[0, lane] += factor_symmetric(square)[0]
 
 
 @njit(**INNER)

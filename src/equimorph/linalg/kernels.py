@@ -52,15 +52,15 @@ def solve_lanes(a, size, width):
 
 @njit(**FLAGS)
 def factor_symmetric(a):
-    """Number of negative eigenvalues of a symmetric matrix, by LDLᵀ with complete pivoting.
+    """Negative eigenvalues of a symmetric matrix, and det, by LDLᵀ with complete pivoting.
 
     Bunch and Parlett (1971): 1 × 1 and 2 × 2 pivots; `a` is overwritten. Sylvester's law of inertia
-    gives the signs: a 2 × 2 pivot chosen by this rule always has one negative eigenvalue. −1 where
-    entries are not finite.
+    gives the signs: a 2 × 2 pivot chosen by this rule always has one negative eigenvalue. −1 and
+    nan where entries are not finite.
     """
     size = a.shape[0]
     alpha = 0.6403882032022076  # (1 + √17) / 8 bounds the growth of the entries
-    negative, k = 0, 0
+    negative, k, product = 0, 0, 1.0
     while k < size:
         diagonal, d = -1.0, k
         off, r, s = -1.0, k, k
@@ -71,13 +71,14 @@ def factor_symmetric(a):
                 if abs(a[i, j]) > off:
                     off, r, s = abs(a[i, j]), i, j
         if max(diagonal, off) < 0.0:  # a pivot that overflows leaves no numbers
-            return -1
+            return -1, np.nan
         if max(diagonal, off) == 0.0:
-            break
+            return negative, 0.0
         if diagonal >= alpha * off:
             _swap(a, k, d)
             pivot = a[k, k]
             negative += pivot < 0.0
+            product *= pivot
             for i in range(k + 1, size):
                 factor = a[i, k] / pivot
                 for j in range(k + 1, i + 1):
@@ -92,6 +93,7 @@ def factor_symmetric(a):
             negative += 1
             p, q, b = a[k, k], a[k + 1, k + 1], a[k + 1, k]
             determinant = p * q - b * b
+            product *= determinant
             for i in range(k + 2, size):
                 first = (q * a[i, k] - b * a[i, k + 1]) / determinant
                 second = (p * a[i, k + 1] - b * a[i, k]) / determinant
@@ -101,7 +103,7 @@ def factor_symmetric(a):
                 for j in range(k + 2, i):
                     a[j, i] = a[i, j]
             k += 2
-    return negative
+    return negative, product
 
 
 @njit(**INNER)
@@ -153,7 +155,7 @@ def orthonormal_lanes(rows, count, weights):
 def count_negative(matrices, out):
     """Negative eigenvalues of each symmetric matrix (lanes, n, n)."""
     for lane in range(matrices.shape[0]):
-        out[lane] = factor_symmetric(matrices[lane].copy())
+        out[lane] = factor_symmetric(matrices[lane].copy())[0]
 
 
 @njit(**INNER)

@@ -6,7 +6,7 @@ import numpy as np
 
 from equimorph.array_types import Float, Int
 from equimorph.arrays import Entries, Lanes, Parameters, Sides, Values
-from equimorph.linalg import BorderedSolution
+from equimorph.linalg import Border, BorderedSolution
 from equimorph.linalg.condensed import PIVOT_GUARD
 from equimorph.linalg.dense import no_border
 from equimorph.linalg.lanes import over_lanes
@@ -155,7 +155,7 @@ class SpatialMechanics(SpatialLagrangian, JointEquations):
     def entries(self, z: Lanes, p: Parameters, shift: Shift = None) -> Entries:
         """Entries of F_z − shift·mass in the order of `layout`, by derivatives along directions.
 
-        For lanes with an unsafe pivot, and where a phase condition pins orbits.
+        For lanes with an unsafe pivot.
         """
         rows, columns, groups = self.layout.rows, self.layout.columns, self._groups
         count, lanes = int(groups.max()) + 1, len(z)
@@ -212,24 +212,44 @@ class SpatialMechanics(SpatialLagrangian, JointEquations):
         One kernel; lanes with an unsafe pivot take the sparse solve, which may pivot.
         """
         self.check_widths((z, p))
+        around = no_border(len(z), self.size) if border is None else border
+        found = self.eliminate(z, p, rhs, around, shift, np.empty((len(z), 0)))
+        return self.pivot(found, z, p, rhs, around, shift)
+
+    def eliminate(
+        self, z: Lanes, p: Parameters, rhs: Sides, around: Border, shift: Shift, springs: Lanes
+    ) -> BorderedSolution:
+        """The compiled solve, with the springs of its kernel; lanes to be pivoted are flagged."""
         lanes = len(z)
-        around = no_border(lanes, self.size) if border is None else border
         lowered = np.zeros(lanes) if shift is None else shift * (2.0 / LENGTH_STIFFNESS)
-        inputs = [np.ascontiguousarray(each) for each in (z, p, lowered, *around, rhs)]
+        inputs = [np.ascontiguousarray(each) for each in (z, p, lowered, springs, *around, rhs)]
         x, (determinant, ratio) = np.empty(rhs.shape), np.empty((2, lanes))
         negative = np.empty(lanes, dtype=np.int64)
         outputs = [x, negative, determinant, ratio]
         over_lanes(solve_bordered_lanes, self._step_tables, inputs, outputs)
         negative -= 3 - self.constraints
         determinant *= self.determinant_sign
-        unsafe = ~(ratio >= PIVOT_GUARD)
+        return BorderedSolution(x, negative, ratio, ~(ratio >= PIVOT_GUARD), determinant)
+
+    def pivot(
+        self,
+        found: BorderedSolution,
+        z: Lanes,
+        p: Parameters,
+        rhs: Sides,
+        around: Border,
+        shift: Shift,
+    ) -> BorderedSolution:
+        """Solutions where those flagged come from the sparse solve."""
+        unsafe = found.pivoted
         if unsafe.any():
             entries = self.entries(z[unsafe], p[unsafe], None if shift is None else shift[unsafe])
             some = tuple(np.ascontiguousarray(each[unsafe]) for each in around)
             again = self.layout.solve(entries, (some[0], some[1], some[2]), rhs[unsafe])
-            x[unsafe], negative[unsafe] = again.x, again.negative
-            determinant[unsafe], ratio[unsafe] = again.determinant, again.pivot_ratio
-        return BorderedSolution(x, negative, ratio, unsafe, determinant)
+            found.x[unsafe], found.negative[unsafe] = again.x, again.negative
+            found.determinant[unsafe] = again.determinant
+            found.pivot_ratio[unsafe] = again.pivot_ratio
+        return found
 
     def solver(
         self, parts: tuple[np.ndarray, ...], z: Lanes, p: Parameters, shift: Shift = None

@@ -20,16 +20,11 @@ from equimorph.array_types import Float
 from equimorph.arrays import Flags, Lanes, Parameters, Sides, Values
 from equimorph.errors import InputError
 from equimorph.linalg import BorderedSolution
+from equimorph.linalg.dense import multiply, no_border
 from equimorph.structures.equations import Advance, AnyBorder, Direction, Equations, Shift
 from equimorph.structures.spatial.mechanics import SpatialMechanics
 from equimorph.structures.spatial.model import ANGLES, SpatialModel
-from equimorph.structures.spatial.quaternions import (
-    Jet,
-    conjugate,
-    exponential,
-    matrices,
-    product,
-)
+from equimorph.structures.spatial.quaternions import Jet
 from equimorph.tolerances import SAME_NUMBER
 
 ACROSS = tuple(f"{angle}_{side}" for side in "AB" for angle in ANGLES[:2])
@@ -172,8 +167,67 @@ class PinnedMechanics(SpatialMechanics):
     def solve(
         self, z: Lanes, p: Parameters, rhs: Sides, border: AnyBorder = None, shift: Shift = None
     ) -> BorderedSolution:
-        """Solve with F_z − shift·mass, bordered, by sparse elimination."""
-        return self.layout.solve(self.entries(z, p, shift), border, rhs)
+        """Solve with F_z − shift·mass, bordered: the rod's own solve with two borders more.
+
+        That of the condition, ∂F/∂μ; and that which takes out a spring against the turn of one
+        cross-section about the axis, with which F_z of the rod itself is regular.
+        """
+        self.check_widths((z, p))
+        around = no_border(len(z), self.size) if border is None else border
+        along = np.zeros_like(z)
+        along[:, -1] = 1.0
+        own = self.equations(z, p, (along, np.zeros_like(p)))[1]
+        springs, turn = self._springs(z)
+        columns, rows = (
+            np.concatenate([own[:, None, :-1], turn[:, None], each[..., :-1]], axis=1)
+            for each in around[:2]
+        )
+        k = columns.shape[1]
+        corner = np.zeros((len(z), k, k))
+        corner[:, 0, 0], corner[:, 1, 1], corner[:, 2:, 2:] = own[:, -1], 1.0, around[2]
+        corner[:, 0, 2:], corner[:, 2:, 0] = around[0][..., -1], around[1][..., -1]
+        mu = np.where(self.on_axis(z), 0.0, z[:, -1])
+        found = self.bare.eliminate(
+            z[:, :-1],
+            np.concatenate([mu[:, None], p], axis=1),
+            np.insert(rhs, self.size, 0.0, axis=-1),
+            (columns, rows, corner),
+            shift,
+            springs,
+        )
+        found = replace(found, x=np.delete(found.x, self.size, axis=-1))
+        return self.pivot(found, z, p, rhs, around, shift)
+
+    @cached_property
+    def bare(self) -> SpatialMechanics:
+        """The rod without the condition, with μ as the first of its parameters."""
+        names, m = ("μ", *self.model.names), self.constraints - 1
+        return SpatialMechanics(replace(self.model, multipliers=m, names=names))
+
+    def _springs(self, z: Lanes) -> tuple[Lanes, Lanes]:
+        """Springs of `solve_bordered_lanes`, and w·φ_v by the unknowns without μ.
+
+        At the vertex that ξ moves most, along ξ = (0, 0, −q₃, q₂); none on the axis.
+        """
+        springs, row = np.zeros((len(z), 4)), np.zeros((len(z), self.size - 1))
+        start, degree = self.model.unknown_nodes.start, self.mesh.degree
+        nodes = np.arange(self.unknowns // 4)[-start % degree :: degree]
+        if len(nodes) == 0:  # one element between clamps: all lanes are pivoted
+            return springs, row
+        lanes = np.arange(len(z))
+        q = z[:, : self.unknowns].reshape(len(z), self.unknowns // 4, 4)
+        node = nodes[np.argmax((q[:, nodes, 2:] ** 2).sum(axis=-1), axis=1)]
+        a, b, c, d = q[lanes, node].T
+        size, across = np.sqrt(a * a + b * b + c * c + d * d), np.sqrt(c * c + d * d)
+        root = np.sqrt(self.model.stiffness.max() * self.mesh.elements)
+        root = np.where(self.on_axis(z), 0.0, root)
+        by = root / (size * np.maximum(across, ON_AXIS**2))
+        springs[:, 0] = (node + start) // degree
+        springs[:, 1], springs[:, 2] = -by * across**2, by * (b * c - a * d)
+        springs[:, 3] = by * (b * d + a * c)
+        row[lanes, 4 * node + 2] = -2.0 * by * d
+        row[lanes, 4 * node + 3] = 2.0 * by * c
+        return springs, row
 
     def advance(
         self, z: Lanes, p: Parameters, dp: Parameters, row: Lanes, corner: Values, defect: Values
@@ -187,26 +241,30 @@ class PinnedMechanics(SpatialMechanics):
 
     def turn(self, z: Lanes, angle: Values) -> Lanes:
         """States turned about the axis by angles, with the forces of the supports."""
-        by = exponential(angle[:, None] * np.eye(3)[0])
-        q = z[:, : self.unknowns].reshape(len(z), self.unknowns // 4, 4)
-        q = product(product(by[:, None], q), conjugate(by)[:, None])
-        held = self.model.reaction[:, : self.constraints]
-        forces = np.einsum("lck,ka,la->lc", matrices(by), held, z[:, self.unknowns :])
-        ends = forces @ held
-        ends[:, -1] = z[:, -1]
+        cosine, sine = np.cos(angle)[:, None], np.sin(angle)[:, None]
+        held = self.model.reaction[1:, : self.constraints]
+        q = z[:, : self.unknowns].reshape(len(z), self.unknowns // 4, 4).copy()
+        c, d = q[..., 2].copy(), q[..., 3].copy()
+        q[..., 2], q[..., 3] = cosine * c - sine * d, sine * c + cosine * d
+        ends = z[:, self.unknowns :]
+        f, g = np.einsum("la,ka->kl", ends, held)[..., None]
+        moved = np.concatenate([cosine * f - sine * g - f, sine * f + cosine * g - g], axis=1)
+        ends = ends + np.einsum("lk,ka->la", moved, held)
         return np.concatenate([q.reshape(len(z), self.unknowns), ends], axis=1)
 
-    def phase(self, z: Lanes, p: Parameters) -> Values:
+    def phase(self, z: Lanes) -> Values:
         """Angle by which a state is turned from one that the condition picks, −π/2 to π/2."""
-        t = matrices(self.rotations(z, p)[:, self.mesh.element_nodes])[..., 0]
-        g = phase_weight(self.mesh.nodes[self.mesh.element_nodes]) * self.weights
-        left, aside = (np.einsum("ei,lei->l", g, t[..., c]) for c in (1, 2))
+        inner = self.model.unknown_nodes
+        g = (phase_weight(self.mesh.nodes) * self.mesh.weights)[inner, None]
+        a, b, c, d = np.moveaxis(z[:, : self.unknowns].reshape(len(z), len(g), 4), -1, 0)
+        square = a * a + b * b + c * c + d * d
+        left, aside = (multiply(t / square, g)[:, 0] for t in (b * c + a * d, b * d - a * c))
         side = np.where(left < 0.0, -1.0, 1.0)
         return np.asarray(np.arctan2(side * aside, side * left))
 
-    def aligned(self, z: Lanes, p: Parameters) -> Lanes:
+    def aligned(self, z: Lanes) -> Lanes:
         """The nearest states on their orbits that meet the phase condition."""
-        return self.turn(z, -self.phase(z, p))
+        return self.turn(z, -self.phase(z))
 
 
 class OrbitMechanics(SpatialMechanics):
@@ -249,7 +307,7 @@ class OrbitMechanics(SpatialMechanics):
         if not there.any():
             return z
         out = z.copy()
-        out[there] = self.pinned.aligned(self._widen(z[there]), p[there])[:, :-1]
+        out[there] = self.pinned.aligned(self._widen(z[there]))[:, :-1]
         return out
 
     def _widen(self, z: np.ndarray) -> np.ndarray:
@@ -265,7 +323,7 @@ class OrbitMechanics(SpatialMechanics):
             return super().advance(z, p, dp, row, corner, defect)
         own, by = self._widen(z[there]), self.pinned.turn
         along = self.have_orbits(dp[there], moving=True) & dp[there].any(axis=1)
-        angle = np.where(along, 0.0, self.pinned.phase(own, p[there]))
+        angle = np.where(along, 0.0, self.pinned.phase(own))
         rows = by(self._widen(row[there]), -angle)
         step = self.pinned.advance(
             by(own, -angle), p[there], dp[there], rows, corner[there], defect[there]
@@ -286,7 +344,7 @@ class OrbitMechanics(SpatialMechanics):
         if not there.any():
             return super().solve(z, p, rhs, border, shift)
         own = self._widen(z[there])
-        angle = self.pinned.phase(own, p[there])
+        angle = self.pinned.phase(own)
         turn = partial(self._turn_parts, angle)
         around = None
         if border is not None:

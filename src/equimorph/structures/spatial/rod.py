@@ -279,7 +279,7 @@ class SpatialRod(DescribedInSpace):
         given = {**state.parameters, **clamps}
         known = {name: value for name, value in given.items() if name in names}
         p = parameter_vector(self.parameters, known)[None]
-        z, found = correct_at_parameters(self, rod.aligned(z, p), p)
+        z, found = correct_at_parameters(self, rod.aligned(z), p)
         if found[0] and rod.resolved(z, p)[0]:
             return State(self, z[0], p[0])
         raise InputError(

@@ -9,7 +9,14 @@ import numpy as np
 
 from equimorph.linalg.compiled import njit
 from equimorph.linalg.condensed_kernels import pivot_ratio
-from equimorph.linalg.kernels import FLAGS, INNER, read_lanes, solve_lanes, write_lanes
+from equimorph.linalg.kernels import (
+    FLAGS,
+    INNER,
+    factor_symmetric,
+    read_lanes,
+    solve_lanes,
+    write_lanes,
+)
 from equimorph.linalg.simd import LANES, load, load4, repeat4, spread, store, work_rows
 from equimorph.structures.spatial.chain_kernels import (
     close_system,
@@ -161,6 +168,29 @@ def join_system(axes, products, border, k, free, columns, rows, corner, rhs, sta
 
 
 @njit(**INNER)
+def spring_vertices(springs, start, shares, vertices):
+    """Add the spring of each lane to its vertex."""
+    for lane in range(LANES):
+        v = int(springs[start + lane, 0])
+        for k in range(3):
+            for j in range(k, 3):
+                stiffness = springs[start + lane, 1 + k] * springs[start + lane, 1 + j]
+                vertices[(3 * v + k) * shares + j, lane] += stiffness
+
+
+@njit(**INNER)
+def note_pinned(small, system, square, extremes):
+    """Count negative eigenvalues of closures, condition and spring together; det."""
+    for lane in range(LANES):
+        for a in range(len(square)):
+            for c in range(len(square)):
+                square[a, c] = small[a * system + c, lane]
+        negative, determinant = factor_symmetric(square)
+        extremes[COUNT, lane] += negative
+        extremes[PRODUCT, lane] = determinant / extremes[PRODUCT, lane]
+
+
+@njit(**INNER)
 def reduced_side(matrix, at, k, side, small):
     """Reduced column of a right-hand side, less those of closures and border by their results."""
     size = 3 + k
@@ -230,12 +260,17 @@ def write_side(first, stop, k, side, q, radii, slopes, sides, small, turns, out)
 def solve_bordered_lanes(
     places, slopes, weights, stiff, moments, moment_picks, torsion, torsion_picks, forces,
     force_picks, tension, tension_picks, softness, turned, held, axes, closing_table, compliance,
-    lengths, z, p, shift, columns, rows, corner, rhs, x, negative, determinant, ratio,
+    lengths, z, p, shift, springs, columns, rows, corner, rhs, x, negative, determinant, ratio,
 ):  # fmt: skip
     """Solve ``[F_z − shift·mass C; R D] x = rhs``; see `linalg.dense.BorderedSolution`.
 
     columns, rows (lanes, k, size); corner (lanes, k, k); rhs, x (lanes, sides, size + k); shift: by
     half the stiffness of a length over the mass.
+
+    springs: none, or of each lane the number of a vertex v and w, for a spring ``½ (w·φ_v)²``. It
+    makes F_z regular that a condition makes so. The first column of the border is then that of the
+    condition, the second w·φ_v with 1 in the corner, which takes the spring out again: inertia and
+    determinant are those of F_z with the condition.
     """
     elements, order = slopes.shape[0], slopes.shape[1]
     k, many, entries = columns.shape[1], rhs.shape[1], z.shape[1]
@@ -260,6 +295,7 @@ def solve_bordered_lanes(
     pivots, vertices = work_rows(elements * inner), work_rows((elements + 1) * 3 * shares)
     ties, products = work_rows(elements * 9), work_rows(left * border)
     small, turns = work_rows((3 + k) * system), work_rows(3 * nodes)
+    square = np.empty((5, 5))
     sides, out, lowered = work_rows(4 * stop * max(count, 1)), work_rows(4 * nodes), work_rows(1)
     matrix[:], lower[:], none[:] = 0.0, 0.0, 0.0
     lanes = z.shape[0]
@@ -300,13 +336,18 @@ def solve_bordered_lanes(
             to_vertices(e, inner, size, width, matrix, base, border, vertices, ties)
         for v in range(begin, last + 1):
             fill_vertex(v, v * degree, stop, radii, total, count, sides, shares, vertices)
+        if springs.shape[1] > 0:
+            spring_vertices(springs, start, shares, vertices)
         for v in range(begin, last + 1):
             eliminate_vertex(v, last, border, left, vertices, ties, products, extremes)
         multiply_lengths(first, stop, k, count, border, radii, sides, products)
         hold_axes(axes, compliant)
         close_system(axes, compliant, products, border, system, small)
-        note_closures(small, system, extremes)
         join_system(axes, products, border, k, free, columns, rows, corner, rhs, start, small)
+        if springs.shape[1] > 0:
+            note_pinned(small, system, square, extremes)
+        else:
+            note_closures(small, system, extremes)
         solve_lanes(small, 3 + k, system)
         for c in range(many):
             side = (c, system)
