@@ -101,6 +101,47 @@ def test_fold_is_the_limit_of_folds_of_rods_without_orbits(closing):
     assert closing.end.state["nu"] == pytest.approx(limit, abs=1e-6)
 
 
+@pytest.mark.parametrize(
+    "options",
+    [
+        {},
+        {"axial": 40.0, "shear": 15.0},
+        {"ends": ("clamped", "guided"), "loads": {"P": em.PointForce(1.0, (-1.0, 0.0, 0.0))}},
+        {"ends": ("pinned", "clamped"), "elements": 3, "degree": 4},
+    ],
+)
+def test_solves_with_a_spring_and_two_borders_are_those_of_the_whole_matrix(options):
+    """Solutions, inertia and determinant, with borders and shifts, also on the axis.
+
+    Against F_z with the condition, eliminated with pivots; 1e-8: conditions reach 1e7.
+    """
+    rod = em.SpatialRod(**{**ROUND, **options}, phase=True)
+    rng = np.random.default_rng(17)
+    p = rng.uniform(-1.0, 1.0, (24, len(rod.parameters)))
+    start = rod.natural_state(twist_B=1.0) if not options else None
+    z = rod.mechanics.sample(p, rng)
+    if start is not None:
+        p[:8], z[:8] = start.p, start.z + 1e-6 * rng.standard_normal((8, len(start.z)))
+    mechanics, lanes, size = rod.mechanics, len(z), rod.mechanics.size
+    if "guided" in options.get("ends", ""):  # elsewhere a straight rod, whose span is given, has no regular F_z
+        z[-4:, : mechanics.unknowns] = np.tile([1.0, 0.3, 0.0, 0.0], mechanics.unknowns // 4)
+        assert mechanics.on_axis(z)[-4:].all()
+    for shift in (None, rng.uniform(-0.1, 0.3, lanes)):
+        entries = mechanics.entries(z, p, shift)
+        for k in (0, 2):
+            columns, rows = rng.standard_normal((2, lanes, k, size))
+            border = (columns, rows, rng.standard_normal((lanes, k, k))) if k else None
+            sides = rng.standard_normal((lanes, 3, size + k))
+            found = mechanics.solve(z, p, sides, border, shift)
+            whole = mechanics.layout.solve(entries, border, sides)
+            scale = np.abs(whole.x).max(axis=(1, 2), keepdims=True)
+            np.testing.assert_allclose(found.x / scale, whole.x / scale, atol=1e-8, rtol=0.0)
+            np.testing.assert_array_equal(found.negative, whole.negative)
+            known = np.isfinite(whole.determinant)
+            np.testing.assert_allclose(found.determinant[known], whole.determinant[known], 1e-7)
+            assert found.pivoted.mean() < 0.1
+
+
 # --- applied by itself ---------------------------------------------------------------------------
 
 

@@ -212,8 +212,6 @@ class PinnedMechanics(SpatialMechanics):
         springs, row = np.zeros((len(z), 4)), np.zeros((len(z), self.size - 1))
         start, degree = self.model.unknown_nodes.start, self.mesh.degree
         nodes = np.arange(self.unknowns // 4)[-start % degree :: degree]
-        if len(nodes) == 0:  # one element between clamps: all lanes are pivoted
-            return springs, row
         lanes = np.arange(len(z))
         q = z[:, : self.unknowns].reshape(len(z), self.unknowns // 4, 4)
         node = nodes[np.argmax((q[:, nodes, 2:] ** 2).sum(axis=-1), axis=1)]
