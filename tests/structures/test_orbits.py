@@ -123,7 +123,9 @@ def test_solves_with_a_spring_and_two_borders_are_those_of_the_whole_matrix(opti
     if start is not None:
         p[:8], z[:8] = start.p, start.z + 1e-6 * rng.standard_normal((8, len(start.z)))
     mechanics, lanes, size = rod.mechanics, len(z), rod.mechanics.size
-    if "guided" in options.get("ends", ""):  # elsewhere a straight rod, whose span is given, has no regular F_z
+    if "guided" in options.get(
+        "ends", ""
+    ):  # with its span given, F_z of a straight rod is singular
         z[-4:, : mechanics.unknowns] = np.tile([1.0, 0.3, 0.0, 0.0], mechanics.unknowns // 4)
         assert mechanics.on_axis(z)[-4:].all()
     for shift in (None, rng.uniform(-0.1, 0.3, lanes)):
