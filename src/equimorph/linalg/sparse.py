@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from heapq import heappop, heappush
 
 import numpy as np
 
@@ -10,6 +11,8 @@ from equimorph.linalg.dense import Border, BorderedSolution, no_border, solve_bo
 from equimorph.linalg.lanes import over_lanes
 from equimorph.linalg.sparse_kernels import solve_sparse
 
+GONE = -1
+"""Degree of what is eliminated."""
 SWEEPS = 4
 """Inverse iterations by which the smallest eigenvalue is estimated."""
 
@@ -27,6 +30,7 @@ class _Elimination:
     order: Int[np.ndarray, " size"]
     start: Int[np.ndarray, " starts"]
     rows: Int[np.ndarray, " below"]
+    alike: Int[np.ndarray, "2 size"]
     target: Int[np.ndarray, " pairs"]
     scatter: Int[np.ndarray, " entries"]
 
@@ -71,23 +75,16 @@ class SparseLayout:
         order = np.array([variable for variable, _ in below])
         place = np.empty(self.size, int)
         place[order] = np.arange(self.size)
-        columns = [sorted(place[i] for i in others) for _, others in below]
-        start = np.concatenate([[0], np.cumsum([len(column) for column in columns])])
-        slot = {(k, k): k for k in range(self.size)}
-        for k, column in enumerate(columns):
-            slot |= {(i, k): self.size + start[k] + n for n, i in enumerate(column)}
-        target = [
-            slot[column[i], column[j]]
-            for column in columns
-            for i in range(len(column))
-            for j in range(i + 1)
-        ]
-        ends = np.sort(np.stack([place[self.rows], place[self.columns]]), axis=0)
-        scatter = [slot[high, low] for low, high in ends.T.tolist()]
-        rows = [i for column in columns for i in column]
-        return _Elimination(
-            *(np.array(a, dtype=int) for a in (order, start, rows, target, scatter))
-        )
+        start = np.concatenate([[0], np.cumsum([len(others) for _, others in below])])
+        rows = np.empty(start[-1], int)
+        for k, (_, others) in enumerate(below):
+            rows[start[k] : start[k + 1]] = np.sort(place[others])
+        low, high = np.sort(np.stack([place[self.rows], place[self.columns]]), axis=0)
+        known = np.arange(self.size).repeat(np.diff(start)) * self.size + rows
+        slot = self.size + np.searchsorted(known, low * self.size + high)
+        scatter = np.where(low == high, low, slot)
+        alike, target = _updates(start, rows, known)
+        return _Elimination(order, start, rows, alike, target, scatter)
 
     def dense(self, values: Float[np.ndarray, "lanes entries"]) -> Float[np.ndarray, "lanes n n"]:
         """Return the matrices in full."""
@@ -114,7 +111,7 @@ class SparseLayout:
         x, (growth, determinant) = np.empty(rhs.shape), np.empty((2, lanes))
         negative = np.empty(lanes, dtype=np.int64)
         how = self.elimination
-        shared = (how.start, how.rows, how.target, how.scatter, how.order)
+        shared = (how.start, how.rows, how.alike, how.target, how.scatter, how.order)
         if lanes:
             over_lanes(solve_sparse, shared, arrays, [x, negative, growth, determinant])
         pivoted = ~(growth <= GROWTH)
@@ -139,11 +136,34 @@ class SparseLayout:
         return smallest
 
 
+def _updates(
+    start: Int[np.ndarray, " starts"],
+    rows: Int[np.ndarray, " below"],
+    known: Int[np.ndarray, " below"],
+) -> tuple[Int[np.ndarray, "2 size"], Int[np.ndarray, " pairs"]]:
+    """Groups of columns with the same rows below, and the places that pairs of these update.
+
+    As in `sparse_kernels.eliminate`; known: column · size + row of each entry of L.
+    """
+    size, count = len(start) - 1, np.diff(start)
+    alike, tables, total = np.zeros((2, size), int), [], 0
+    for k in range(size - 1, -1, -1):
+        below = rows[start[k] : start[k + 1]]
+        if len(below) and below[0] == k + 1 and len(below) == count[k + 1] + 1:
+            alike[:, k] = alike[:, k + 1] + [1, 0]
+            continue
+        right, left = np.tril_indices(len(below), -1)
+        tables.append(size + np.searchsorted(known, below[left] * size + below[right]))
+        alike[1, k] = total
+        total += len(left)
+    return alike, np.concatenate(tables).astype(np.int32)
+
+
 def _elimination(
     rows: Int[np.ndarray, " entries"],
     columns: Int[np.ndarray, " entries"],
     ranks: Int[np.ndarray, " size"],
-) -> list[tuple[int, set[int]]]:
+) -> list[tuple[int, Int[np.ndarray, " below"]]]:
     """Variables in the order of elimination, each with the later ones in its column of L.
 
     Minimum degree among those of the lowest rank that are left.
@@ -154,14 +174,19 @@ def _elimination(
         if i != j:
             near[i].add(j)
             near[j].add(i)
-    left = set(range(size))
+    degree = [len(each) for each in near]
+    queue = sorted(zip(rank, degree, range(size), strict=True))
     below = []
-    while left:
-        variable = min(left, key=lambda i: (rank[i], len(near[i]), i))
-        others = near[variable]
-        left.remove(variable)
+    while queue:
+        _, count, variable = heappop(queue)
+        if count != degree[variable]:  # it has another degree by now, or is gone
+            continue
+        others, near[variable], degree[variable] = near[variable], set(), GONE
         for other in others:
             near[other] |= others
             near[other] -= {variable, other}
-        below.append((variable, others))
+            if len(near[other]) != degree[other]:
+                degree[other] = len(near[other])
+                heappush(queue, (rank[other], degree[other], other))
+        below.append((variable, np.fromiter(others, int, len(others))))
     return below

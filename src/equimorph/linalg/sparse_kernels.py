@@ -17,33 +17,40 @@ from equimorph.linalg.simd import (
 
 
 @njit(**INNER)
-def eliminate(start, target, factors, columns):
+def eliminate(start, rows, alike, target, factors, columns):
     """LDLᵀ in place without pivoting, the last pivot left alone.
 
-    `factors` holds the pivots, then the columns of L one after the other; `target` the places that
-    each pair of entries of a column updates. `columns` has room for the longest column. Returns
+    `factors` holds the pivots, then the columns of L one after the other, whose rows ascend.
+    Columns with the same rows below follow each other: alike[0] counts those of a group after each;
+    `target` has, from alike[1] on, the places that each pair of entries below the group updates.
+    `columns` has room for the longest column. Returns
     (number of negative pivots, largest change of a diagonal entry, product of the pivots).
     """
     size = len(start) - 1
     negative, growth = spread(0.0), spread(0.0)
     zero, one = spread(0.0), spread(1.0)
-    pair, product = 0, one
+    product = one
     for k in range(size - 1):
         pivot = load(factors, k)
         product = product * pivot
         negative = negative + where_less(pivot, zero, one, zero)
         inverse = one / pivot
-        first, count = size + start[k], start[k + 1] - start[k]
+        first, count = start[k], start[k + 1] - start[k]
+        group, pair = alike[0, k], alike[1, k]
         for i in range(count):
-            column = load(factors, first + i)
+            column, own = load(factors, size + first + i), rows[first + i]
             store(columns, i, column)
             factor = column * inverse
-            store(factors, first + i, factor)
+            store(factors, size + first + i, factor)
             growth = larger(growth, absolute(factor * column))
-            for j in range(i + 1):
-                at = target[pair + j]
+            store(factors, own, load(factors, own) - factor * column)
+            for j in range(min(i, group)):
+                at = size + start[k + 1 + j] + i - j - 1
                 store(factors, at, load(factors, at) - factor * load(columns, j))
-            pair += i + 1
+            for j in range(group, i):
+                at = target[pair]
+                store(factors, at, load(factors, at) - factor * load(columns, j))
+                pair += 1
     return negative, growth, product
 
 
@@ -110,7 +117,7 @@ def backward(start, rows, factors, x, width, first):
 
 @njit(**FLAGS)
 def solve_sparse(
-    start, rows, target, scatter, order, values, columns, border_rows, corner, rhs,
+    start, rows, alike, target, scatter, order, values, columns, border_rows, corner, rhs,
     x, negative, growth, determinant,
 ):  # fmt: skip
     """Bordered solutions, inertia, growth and determinant of all lanes: `SparseLayout.solve`."""
@@ -132,7 +139,7 @@ def solve_sparse(
             value = load(raw, e)
             store(factors, scatter[e], value)
             largest = larger(largest, absolute(value))
-        below, grown, product = eliminate(start, target, factors, column)
+        below, grown, product = eliminate(start, rows, alike, target, factors, column)
         one, zero = spread(1.0), spread(0.0)
         below = below + where_less(load(factors, size - 1), zero, one, zero)
         store(column, 0, below)

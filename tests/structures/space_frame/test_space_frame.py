@@ -1,5 +1,7 @@
 """Frames in space against rods in space, planar frames, statics, and dense algebra."""
 
+import tracemalloc
+
 import numpy as np
 import pytest
 
@@ -178,3 +180,38 @@ def test_errors_are_estimated_and_small():
         if degree == 4:
             bound = frame.error_estimate(state.z[None], state.p[None])[0]
     assert abs(tips[1] - tips[0]) < bound < 1e-2
+
+
+def lattice(columns, rows):
+    """Rods along x that are hinged to rods along y, pinned at their ends."""
+    along = [[f"{i}x{j}" for i in range(columns + 2)] for j in range(1, rows + 1)]
+    across = [[f"{i}x{j}" for j in range(rows + 2)] for i in range(1, columns + 1)]
+    joints = {name: (*map(float, name.split("x")), 0.0) for rod in along + across for name in rod}
+    members = [em.SpatialMember(rod, EA=2000.0) for rod in along]
+    for rod in across:
+        hinges = dict.fromkeys(rod[1:-1], (0.0, 0.0, 1.0))
+        members.append(em.SpatialMember(rod, EA=2000.0, hinges=hinges))
+    ends = dict.fromkeys((rod[k] for rod in along + across for k in (0, -1)), "pinned")
+    load = {"P": {across[0][1]: (0.0, 0.0, 1.0)}}
+    return em.SpatialFrame(joints, members, ends, load, elements=1, degree=5)
+
+
+def test_memory_of_a_grid_is_linear_in_its_members():
+    """Largest bytes of construction, step, tangent and index of eight states: power 1.04.
+
+    1.1: the factor of a plane graph has O(n log n) entries. The tables of the elimination alone
+    grew as the power 1.3.
+    """
+    most = []
+    with unchecked():
+        for size in ((2, 2), (2, 2), (6, 7)):  # the first one also imports and compiles
+            tracemalloc.start()
+            frame = lattice(*size)
+            z, p = frame.natural_guess(np.zeros((8, 1))), np.zeros((8, 1))
+            ones = np.ones(8)
+            assert np.isfinite(frame.advance(z, p, p + 1.0, 0.0 * z, ones, ones).dz).all()
+            most.append((frame.model.pieces, tracemalloc.get_traced_memory()[1]))
+            tracemalloc.stop()
+    (_, (few, less), (many, more)) = most
+    assert (few, many) == (12, 97)
+    assert np.log(more / less) / np.log(many / few) < 1.1
