@@ -26,7 +26,7 @@ class Result:
     eset: em.EquilibriumSet
 
 
-def network() -> em.Frame:
+def network(degree: int = 7) -> em.Frame:
     """Return two arches with their post."""
     joints: dict[str, tuple[float, float]] = {}
     members = [em.Member(("M1", "M2"), EI=20.0)]
@@ -41,7 +41,7 @@ def network() -> em.Frame:
         {f"{side}{i}": "pinned" for side in "LR" for i in (1, 2)},
         {"P": {"M2": (0.0, -1.0)}},
         {"t": {"curvature": left | right}},
-        degree=7,
+        degree=degree,
     )
 
 
