@@ -21,8 +21,9 @@ from equimorph.charts.preparation import (
 )
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.complex.marked_complex import Fabric, fabric_of, squared_sides
-from equimorph.manifold.complex.vertices import Vertices, vertices_of
-from equimorph.manifold.geometry.points import VertexKind
+from equimorph.manifold.complex.vertices import Vertices, free_vertices
+from equimorph.manifold.geometry.exact_points import Corrected
+from equimorph.manifold.geometry.points import on_fold
 from equimorph.manifold.geometry.topology import chains, flags_of, keys_of, labels
 from equimorph.manifold.lookup.exact_states import exact_states
 from equimorph.manifold.queries.levels import part_of
@@ -107,7 +108,7 @@ class _Work:
     @classmethod
     def of(cls, eset: EquilibriumSet) -> "_Work":
         """Nothing is cut: charts are strata."""
-        fabric = fabric_of(eset)
+        fabric = fabric_of(eset, on_fold(eset.kinds))  # whose frames find cusps
         number = np.arange(len(eset.strata))
         return cls(eset, replace(fabric, cell_index=eset.stratum.copy()), number)
 
@@ -283,6 +284,5 @@ def _amid(fabric: Fabric, ends: Pairs, share: ItemValues) -> Vertices | None:
     lowest = store.index[ends].min(axis=1)
     if not (good & (index == lowest)).all():
         return None
-    kinds = np.full(len(ends), VertexKind.REFINED)
-    rows = np.ascontiguousarray(store.rows[ends[:, 0]])
-    return vertices_of(setting, z, p, kinds, index, np.full(len(ends), -1), rows)
+    frames = np.zeros((len(z), *store.frame.shape[1:]))  # which nobody asks for
+    return free_vertices(setting, Corrected(z, p, frames, index, good))

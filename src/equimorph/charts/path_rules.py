@@ -133,8 +133,8 @@ class _OnPath(Rule):
             return z
 
         def choose(found: Found, points: Points) -> Bool[np.ndarray, " found"]:
-            asked, back = np.unique(found.point, return_inverse=True)
-            gap = (found.states.z - over(points[asked])[back])[:, :n]
+            asked, back = np.unique(points[found.point], axis=0, return_inverse=True)
+            gap = (found.states.z - over(asked)[back])[:, :n]
             distance = np.sqrt(gap**2 @ eset.structure.mass)
             near = distance < MATCH  # not a number where the path ends elsewhere
             score = np.where(near, distance, np.inf)

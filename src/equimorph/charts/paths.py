@@ -228,13 +228,16 @@ class Walker:
         return x.tolist(), y.tolist()
 
     @cached_property
-    def _around(self) -> dict[int, list[int]]:
-        """Allowed triangles around each vertex."""
-        around: dict[int, list[int]] = {}
-        for cell in np.flatnonzero(self.allowed).tolist():
-            for vertex in self._corners(cell):
-                around.setdefault(vertex, []).append(cell)
-        return around
+    def _stars(self) -> tuple[list[int], list[int]]:
+        """Allowed triangles around vertex after vertex, and where those of each vertex begin."""
+        allowed = np.flatnonzero(self.allowed)
+        vertex = self.corners[allowed].ravel()
+        begin = np.concatenate([[0], np.cumsum(np.bincount(vertex, minlength=len(self.places)))])
+        return np.repeat(allowed, 3)[np.argsort(vertex, kind="stable")].tolist(), begin.tolist()
+
+    def _around(self, vertex: int) -> list[int]:
+        cells, begin = self._stars
+        return cells[begin[vertex] : begin[vertex + 1]]
 
     def way(self, start: int, goal: int) -> Way | None:
         """Vertices and crossed edges of the straight way between two vertices, if there is one.
@@ -261,7 +264,7 @@ class Walker:
         far = float(ahead @ ahead)
         if far == 0.0:
             return None
-        for cell in self._around.get(start, ()):
+        for cell in self._around(start):
             a, b = (v for v in self._corners(cell) if v != start)
             entry = self._crossing(origin, ahead, a, b)
             if entry is None:

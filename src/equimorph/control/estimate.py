@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from equimorph.array_types import Float
 from equimorph.arrays import Values
@@ -127,7 +127,7 @@ def fitted(prior: State, at: Places, covariance: Covariance, measured: Measureme
             break
     posterior = np.linalg.inv(slopes.T @ slopes) * np.outer(scales, scales)
     misfit = float(left @ left)
-    chance = float(chi2.sf(misfit, len(measured.values)))
+    chance = float(chdtrc(len(measured.values), misfit))
     return Estimate(here[0], posterior, misfit, chance)
 
 

@@ -53,7 +53,9 @@ def curved_edges(eset: EquilibriumSet) -> EdgeMiddles:
 
 def _bends(eset: EquilibriumSet, middles: EdgeMiddles, some: slice) -> Values:
     """How far, at most, a point of a shape is from the mean of where it is at both ends."""
-    first, second = (eset.points[end].shape() for end in middles.ends[some].T)
+    used, ends = np.unique(middles.ends[some], return_inverse=True)
+    shapes = eset.points[used].shape()
+    first, second = (shapes[end] for end in ends.reshape(-1, 2).T)
     gap = middles.states[some].shape() - 0.5 * (first + second)
     return np.asarray(np.linalg.norm(gap, axis=2).max(axis=1))
 

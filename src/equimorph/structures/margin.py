@@ -64,7 +64,7 @@ def stability_margin(
     Inverse iteration on pairs of vectors finds it for stable states in four or five solves, the
     last of them so near below it that their inertia, which counts the eigenvalues below a shift,
     proves that it is the smallest. Other states begin at `floor`, numbers below all eigenvalues;
-    without it, bisection on that count isolates the smallest one first.
+    without it, the count gives one by doubling. Bisection isolates what no pairs prove.
     A larger relative `error` than that of round-off saves a solve or two.
     Scale: energy over the metric's unit squared.
     """
@@ -83,8 +83,9 @@ def stability_margin(
     for job in jobs:
         job.result()
     rest = np.flatnonzero(~proved)
-    if floor is not None and len(rest):
-        value[rest], proved[rest] = _above(structure, z[rest], p[rest], error, floor[rest])
+    if len(rest):
+        least = _bracket(structure, z[rest], p[rest])[0] if floor is None else floor[rest]
+        value[rest], proved[rest] = _above(structure, z[rest], p[rest], error, least)
         rest = rest[~proved[rest]]
     if len(rest):
         value[rest] = _by_bisection(structure, z[rest], p[rest])

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from scipy.stats import chi2 as chi_squared
+from scipy.special import chdtrc
 
 from equimorph.argument_checks import check_arguments
 from equimorph.array_types import Float, Int
@@ -258,7 +258,7 @@ def _judge(
 ) -> tuple[Literal["known", "ambiguous", "refused"], str]:
     if len(states) == 0:
         return "refused", "no state of the set comes near to what was measured"
-    chance = float(chi_squared.sf(chi2[0], freedom))
+    chance = float(chdtrc(freedom, chi2[0]))
     if chance < UNLIKELY:
         return "refused", (
             f"the best fit has χ² = {chi2[0]:.4g} ({freedom} degrees of freedom, chance "

@@ -6,7 +6,7 @@ that straight lifts between them stay on it. Lengths are shares of the ranges of
 
 from math import ceil, gamma, pi
 
-from scipy.stats import binom
+from scipy.special import bdtr
 
 CHANCE = 0.05
 """Probability of being missed from which on a corridor counts as excluded."""
@@ -40,7 +40,7 @@ def chance_of_missing(
     radius = min(width / 8.0, reach / 3.0)
     ball = min(1.0, pi ** (0.5 * actuators) / gamma(0.5 * actuators + 1.0) * radius**actuators)
     meets = 1.0 - (1.0 - ball) ** batch
-    return float(binom.cdf(ceil(length / radius) - 1, rounds, meets))
+    return float(bdtr(ceil(length / radius) - 1, rounds, meets))
 
 
 def narrowest_excluded(

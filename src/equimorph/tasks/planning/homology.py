@@ -47,21 +47,20 @@ def cocycles(count: int, edges: Edges, triangles: Triangles) -> Values:
     places = order[np.searchsorted(keys[order], sides @ code)]
     surface = _Surface(edges, triangles, places)
     tree = _spanning(count, edges)
-    parent, sequence = _dual_tree(surface, tree)
+    parent, depth = _dual_tree(surface, tree)
     determined = np.zeros(len(edges), bool)
     determined[parent[parent >= 0]] = True
     generators = np.flatnonzero(~tree & ~determined)
     values = np.zeros((len(edges), len(generators)), dtype=int)
     values[generators, np.arange(len(generators))] = 1
-    signs = np.array([1, 1, -1])
-    for triangle in sequence[::-1]:
-        edge = parent[triangle]
-        if edge < 0:
-            continue
-        own = surface.sides[triangle]
-        place = int(np.flatnonzero(own == edge)[0])
-        total = signs @ values[own] - signs[place] * values[edge]
-        values[edge] = -signs[place] * total
+    # the boundary of each triangle sums to zero, from the leaves of the tree to its roots
+    hung = np.flatnonzero(parent >= 0)
+    hung = hung[np.argsort(-depth[hung], kind="stable")]
+    signs = np.where(surface.sides == parent[:, None], 0, [1, 1, -1])
+    sense = np.array([1, 1, -1])[(signs == 0).argmax(axis=1)]
+    for level in np.split(hung, np.flatnonzero(np.diff(depth[hung])) + 1):
+        total = np.einsum("ts,tsh->th", signs[level], values[surface.sides[level]])
+        values[parent[level]] = -sense[level, None] * total
     return values[:, np.abs(values).max(axis=0, initial=0) > 0]
 
 
@@ -77,8 +76,8 @@ def _spanning(count: int, edges: Edges) -> Bool[np.ndarray, " edges"]:
 
 def _dual_tree(
     surface: _Surface, tree: Bool[np.ndarray, " edges"]
-) -> tuple[Int[np.ndarray, " triangles"], Int[np.ndarray, " order"]]:
-    """Edge by which each triangle hangs on its parent, or −1; triangles from the roots on."""
+) -> tuple[Int[np.ndarray, " triangles"], Int[np.ndarray, " triangles"]]:
+    """Edge by which each triangle hangs on its parent, or −1; and how deep it hangs."""
     outside = len(surface.triangles)
     owner = np.repeat(np.arange(outside), 3)
     side = surface.sides.ravel()
@@ -93,22 +92,22 @@ def _dual_tree(
     one, other, edge = one[free], other[free], edge[free]
     shape = (outside + 1, outside + 1)
     graph = coo_array((np.ones(len(one)), (one, other)), shape=shape).tocsr()
-    known = {
-        pair: int(e)
-        for pair, e in zip(zip(one.tolist(), other.tolist(), strict=True), edge, strict=True)
-    }
-    parent, sequence, seen = np.full(outside, -1), [], np.zeros(outside + 1, bool)
+    keys = one * (outside + 1) + other
+    last = np.argsort(keys, kind="stable")
+    parent, depth = np.full(outside, -1), np.zeros(outside + 1, int)
+    seen = np.zeros(outside + 1, bool)
     for root in (outside, *range(outside)):
         if seen[root]:
             continue
         found, before = breadth_first_order(graph, root, directed=False)
         seen[found] = True
-        for triangle in found[found < outside].tolist():
-            sequence.append(triangle)
-            above = int(before[triangle])
-            if above >= 0:
-                parent[triangle] = known.get((triangle, above), known.get((above, triangle), -1))
-    return parent, np.array(sequence, dtype=int)
+        below = found[1:]
+        for triangle, above in zip(below.tolist(), before[below].tolist(), strict=True):
+            depth[triangle] = depth[above] + 1
+        pair = np.sort(np.stack([below, before[below]]), axis=0)
+        at = np.searchsorted(keys[last], pair[0] * (outside + 1) + pair[1], side="right") - 1
+        parent[below] = edge[last[at]]
+    return parent, depth[:outside]
 
 
 def signature(

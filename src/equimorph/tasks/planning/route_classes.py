@@ -171,12 +171,12 @@ class _Classes:
                 found.append((own, _trace_back(before, len(before) - 1)))
                 continue
             for other, step, change in beside[node]:
-                new = (
-                    own
-                    if change is None
-                    else tuple(a + b for a, b in zip(own, change, strict=True))
-                )
-                if (other, new) not in done and max(map(abs, new), default=0) <= MOST_TURNS:
+                new = own
+                if change is not None:
+                    new = tuple(a + b for a, b in zip(own, change, strict=True))
+                    if max(map(abs, new)) > MOST_TURNS:
+                        continue
+                if (other, new) not in done:
                     heappush(queue, (cost + step, other, new, len(before) - 1))
         return found
 
@@ -185,13 +185,15 @@ class _Classes:
         graph, beside = self.graph, [[] for _ in range(len(self.states))]  # type: ignore[var-annotated]
         good = np.ones(len(graph.pairs), bool)
         good[: len(self.inner)] = ~self.broken[self.inner]
-        for k in np.flatnonzero(good):
-            a, b = graph.pairs[k].tolist()
-            row = graph.values[k]
-            there = tuple(row.tolist()) if row.any() else None
-            back = tuple((-row).tolist()) if row.any() else None
-            beside[a].append((b, float(graph.costs[k]), there))
-            beside[b].append((a, float(graph.costs[k]), back))
+        passing = np.flatnonzero(good & graph.values.any(axis=1))
+        change = {k: tuple(graph.values[k].tolist()) for k in passing.tolist()}
+        rows = np.flatnonzero(good)
+        for k, (a, b), cost in zip(
+            rows.tolist(), graph.pairs[rows].tolist(), graph.costs[rows].tolist(), strict=True
+        ):
+            there = change.get(k)
+            beside[a].append((b, cost, there))
+            beside[b].append((a, cost, there and tuple(-each for each in there)))
         return beside
 
 

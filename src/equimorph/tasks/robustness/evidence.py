@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from scipy.stats import beta
+from scipy.special import betaincinv
 
 from equimorph.array_types import Float, Shaped
 from equimorph.tasks.robustness.erring import Errors, Offsets
@@ -74,13 +74,13 @@ class Survival:
         if self.errors.probability is None:
             return np.nan
         n, k = len(self.kind), self.survivors
-        return float(beta.ppf(1.0 - CONFIDENCE, k, n - k + 1)) if k else 0.0
+        return float(betaincinv(k, n - k + 1, 1.0 - CONFIDENCE)) if k else 0.0
 
     @property
     def most_probable(self) -> float:
         """Upper bound of 95 % confidence on it."""
         n, k = len(self.kind), self.survivors
-        return float(beta.ppf(CONFIDENCE, k + 1, n - k)) if k < n else 1.0
+        return float(betaincinv(k + 1, n - k, CONFIDENCE)) if k < n else 1.0
 
     @property
     def statement(self) -> str:
