@@ -101,8 +101,9 @@ class AnyNetwork(DiscreteStructure):
     def _symmetries(self) -> tuple[Symmetry, ...]:
         return self._find_symmetries()
 
+    @abstractmethod
     def _find_symmetries(self) -> tuple[Symmetry, ...]:
-        return ()
+        """Mirror images and half turns that leave the network as it is."""
 
     # --- descriptors ----------------------------------------------------------------------------
 

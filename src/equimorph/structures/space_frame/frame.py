@@ -12,7 +12,7 @@ from equimorph.array_types import Float
 from equimorph.arrays import Flags, Lanes, Parameters, Values
 from equimorph.errors import InputError
 from equimorph.model import Descriptor, remember_call
-from equimorph.structures.contract import Readers, Written
+from equimorph.structures.contract import Readers, Symmetry, Written
 from equimorph.structures.discrete import STEPS, SURE
 from equimorph.structures.frame.any_model import Actuators, Loads, Patterns
 from equimorph.structures.network import Joints
@@ -22,6 +22,7 @@ from equimorph.structures.space_frame.mechanics import SpatialFrameMechanics
 from equimorph.structures.space_frame.member import SpatialMemberSpec, SpatialSupportSpec
 from equimorph.structures.space_frame.model import SpatialFrameModel
 from equimorph.structures.space_frame.network import spatial_network
+from equimorph.structures.space_frame.symmetries import symmetries
 from equimorph.structures.stressed import Stressed
 from equimorph.structures.unit_system import Units, unit_system
 
@@ -322,6 +323,9 @@ class SpatialFrame(DescribedSpatialFrame):
         if self.model.stressed:
             return grow_stress(self.model, p)
         return super().natural(p)
+
+    def _find_symmetries(self) -> tuple[Symmetry, ...]:
+        return symmetries(self)
 
     # --- pictures -------------------------------------------------------------------------------
 
