@@ -10,7 +10,7 @@ from equimorph.arrays import Lanes, Parameters
 from equimorph.linalg.dense import multiply
 from equimorph.structures.any_network import edges_of_image, images, is_symmetry, parameter_exchange
 from equimorph.structures.contract import Symmetry
-from equimorph.structures.space_frame.mechanics import SpatialFrameMechanics
+from equimorph.structures.space_frame.fields import SpatialFrameFields
 from equimorph.structures.space_frame.model import SpatialFrameModel
 from equimorph.tolerances import SAME_NUMBER
 
@@ -19,7 +19,7 @@ Matrix = Float[np.ndarray, "scalars scalars"]
 Exchange = tuple[Float[np.ndarray, " parameters"], Int[np.ndarray, " parameters"]]
 
 
-def symmetries(frame: SpatialFrameMechanics) -> tuple[Symmetry, ...]:
+def symmetries(frame: SpatialFrameFields) -> tuple[Symmetry, ...]:
     """Images that leave members, supports, loads and actuators as they are, up to signs."""
     found = []
     for name, axes, joints in images(frame.model.network.places):
@@ -89,7 +89,7 @@ class _Image:
     @cached_property
     def _hinges_there(self) -> Int[np.ndarray, " hinges"]:
         """The hinge on which each comes to lie."""
-        return np.searchsorted(self.model.hinged, self.nodes[self.model.hinged])
+        return np.asarray(np.searchsorted(self.model.hinged, self.nodes[self.model.hinged]))
 
     @property
     def hinges(self) -> Float[np.ndarray, " hinges"]:
