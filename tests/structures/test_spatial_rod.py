@@ -136,6 +136,17 @@ def test_both_planar_states_of_the_round_arch_are_unstable_in_space():
         assert inside.margin == pytest.approx(margin, abs=1e-4)
 
 
+def test_the_stable_pair_beside_the_plane_has_its_energy():
+    """(1, 0), q = 2.5: E = 0.36398, margin 0.1035; pushed aside, loaded, and let go."""
+    across = {"side": em.PointForce(0.5, (0.0, 0.0, 1.0))}
+    rod = em.SpatialRod("uniform", torsion=0.77, lateral=1.0, loads=across)
+    steps = [{"side": 0.02}, {"q": 2.5}, {"side": 0.0}]
+    end = em.lift(rod.natural_state(Theta=1.0), steps).end
+    assert end.kind == "arrived"
+    assert end.state.energy == pytest.approx(0.36398, abs=5e-6)
+    assert end.state.margin == pytest.approx(0.1035, abs=5.1e-5)
+
+
 # --- the plane inside the space ------------------------------------------------------------------
 
 FAMILY = {
