@@ -9,6 +9,7 @@ is checked by its parameters, see `model.parameter`.
 import inspect
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cache, cached_property, wraps
+from numbers import Real
 from operator import attrgetter
 from types import NoneType
 from typing import Any, TypeVar, get_type_hints
@@ -48,6 +49,7 @@ CHECKED = "_arguments_are_checked"
 REMEDIES: Mapping[str, tuple[type, str]] = {
     "schedule": (NoneType, "A refused route has no schedule: its `why` says what stopped it."),
     "EquilibriumSet.at": (list, "Use `over` for many points."),
+    "EI": (Real, "Cables, which do not bend and go slack instead of pushing, are not covered."),
 }
 """What is often given by mistake, and what to do instead, by argument or by function."""
 

@@ -250,7 +250,8 @@ def load_map(lmap: LimitLoadMap, ax: Axes | None = None, *, highest: float | Non
     Cells that a jump crosses are cut along it; nothing is interpolated across. Contours are drawn
     where the map is smooth. Dots mark settings at which a constraint is met before stability is
     lost, stripes those at which the structure leaves its plane first; settings without a limit load
-    are hatched.
+    are hatched. Between two curves that pass through one cell no setting lies: there the ground
+    shows, too; a finer grid fills it.
 
     Parameters
     ----------

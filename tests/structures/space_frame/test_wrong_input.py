@@ -56,6 +56,12 @@ def test_a_member_between_ball_joints_spins():
         frame(members=members, supports={"A": "fixed", "C": "pinned"})
 
 
+@pytest.mark.parametrize("member", [em.SpatialMember, em.Member])
+def test_a_cable_that_goes_slack_is_refused_by_name(member):
+    with pytest.raises(InputError, match=r"`EI` must be positive.* Cables, .* slack .* not cov"):
+        member(("A", "B"), EI=0.0, EA=10.0)
+
+
 def test_a_hinge_needs_something_to_turn_on():
     hinged = [em.SpatialMember(pair, hinges={"B": (0, 0, 1)}) for pair in BOTH]
     with pytest.raises(InputError, match=r"`hinges\.B` of member A-B must turn about an axis of"):
