@@ -173,16 +173,17 @@ class SpatialMechanics(SpatialLagrangian, JointEquations):
 
     # --- equations ------------------------------------------------------------------------------
 
-    def equations(self, z: Lanes, p: Parameters, *directions: Direction) -> Jet:
-        """F with its derivatives along none, one or two directions."""
+    def equations(self, z: Lanes, p: Parameters, *directions: Direction, mixed: bool = True) -> Jet:
+        """F with its derivatives along none, one or two directions, and the mixed one if asked."""
         self.check_widths((z, p), *directions)
         lanes, k = len(z), len(directions)
+        parts = 2**k if mixed else 1 + k
         moves_z, moves_p = np.empty((lanes, k, self.size)), np.empty((lanes, k, self.parameters))
         for i, (dz, dp) in enumerate(directions):
             moves_z[:, i], moves_p[:, i] = dz, dp
-        out = np.empty((lanes, 2**k, self.size))
+        out = np.empty((lanes, parts, self.size))
         inputs = [np.ascontiguousarray(z), np.ascontiguousarray(p), moves_z, moves_p]
-        over_lanes(equations_lanes, (*pairs_of(2**k), *self._equation_tables), inputs, [out])
+        over_lanes(equations_lanes, (*pairs_of(parts), *self._equation_tables), inputs, [out])
         return np.moveaxis(out, 1, 0)
 
     def residual(self, z: Lanes, p: Parameters) -> Lanes:

@@ -21,7 +21,14 @@ from equimorph.arrays import Flags, Lanes, Parameters, Sides, Values
 from equimorph.errors import InputError
 from equimorph.linalg import BorderedSolution
 from equimorph.linalg.dense import multiply, no_border
-from equimorph.structures.equations import Advance, AnyBorder, Direction, Equations, Shift
+from equimorph.structures.equations import (
+    Advance,
+    AnyBorder,
+    Direction,
+    LinearSystem,
+    Shift,
+    advance_by,
+)
 from equimorph.structures.spatial.mechanics import SpatialMechanics
 from equimorph.structures.spatial.model import ANGLES, SpatialModel
 from equimorph.structures.spatial.quaternions import Jet
@@ -149,16 +156,16 @@ class PinnedMechanics(SpatialMechanics):
         square = sum(z[:, each] ** 2 @ self.mass[each] for each in across)
         return np.asarray(square < ON_AXIS**2)
 
-    def equations(self, z: Lanes, p: Parameters, *directions: Direction) -> Jet:
-        """F with its derivatives along none, one or two directions."""
+    def equations(self, z: Lanes, p: Parameters, *directions: Direction, mixed: bool = True) -> Jet:
+        """F with its derivatives along none, one or two directions, and the mixed one if asked."""
         void = self.on_axis(z)
         if not void.any():
-            return super().equations(z, p, *directions)
+            return super().equations(z, p, *directions, mixed=mixed)
         given, moves = z.copy(), [(dz.copy(), dp) for dz, dp in directions]
         given[void, -1] = 0.0
         for dz, _ in moves:
             dz[void, -1] = 0.0
-        out = super().equations(given, p, *moves)
+        out = super().equations(given, p, *moves, mixed=mixed)
         out[:, void, -1] = 0.0
         for part, values in zip(out, (z, *(dz for dz, _ in directions)), strict=False):
             part[void, -1] = -values[void, -1]
@@ -167,16 +174,31 @@ class PinnedMechanics(SpatialMechanics):
     def solve(
         self, z: Lanes, p: Parameters, rhs: Sides, border: AnyBorder = None, shift: Shift = None
     ) -> BorderedSolution:
-        """Solve with F_z − shift·mass, bordered: the rod's own solve with two borders more.
+        """Solve with F_z − shift·mass, bordered."""
+        own = self.equations(z, p, self._along(z, p))[1]
+        return self._solve(own, z, p, rhs, border, shift)
 
-        That of the condition, ∂F/∂μ; and that which takes out a spring against the turn of one
-        cross-section about the axis, with which F_z of the rod itself is regular.
-        """
-        self.check_widths((z, p))
-        around = no_border(len(z), self.size) if border is None else border
+    def _along(self, z: Lanes, p: Parameters) -> Direction:
+        """The direction of μ."""
         along = np.zeros_like(z)
         along[:, -1] = 1.0
-        own = self.equations(z, p, (along, np.zeros_like(p)))[1]
+        return along, np.zeros_like(p)
+
+    def _solve(
+        self,
+        own: Lanes,
+        z: Lanes,
+        p: Parameters,
+        rhs: Sides,
+        border: AnyBorder = None,
+        shift: Shift = None,
+    ) -> BorderedSolution:
+        """The solve of the rod without the condition, with two borders more.
+
+        That of the condition, `own` = ∂F/∂μ; and that which takes out a spring against the turn of
+        one cross-section about the axis, with which F_z of the rod itself is regular.
+        """
+        around = no_border(len(z), self.size) if border is None else border
         springs, turn = self._springs(z)
         columns, rows = (
             np.concatenate([own[:, None, :-1], turn[:, None], each[..., :-1]], axis=1)
@@ -230,8 +252,11 @@ class PinnedMechanics(SpatialMechanics):
     def advance(
         self, z: Lanes, p: Parameters, dp: Parameters, row: Lanes, corner: Values, defect: Values
     ) -> Advance:
-        """One Newton step along the curve with parameter velocity `dp`, by the general solve."""
-        return Equations.advance(self, z, p, dp, row, corner, defect)
+        """One Newton step along the curve with parameter velocity `dp`."""
+        ways = (np.zeros_like(z), dp), self._along(z, p)
+        residual, rate, own = self.equations(z, p, *ways, mixed=False)
+        system = LinearSystem(residual, rate[:, None], partial(self._solve, own, z, p))
+        return advance_by(system, row, corner, defect, self.constraints)
 
     def resolved(self, z: Lanes, p: Parameters) -> Flags:
         """Whether the rotations are smooth, and the phase condition exerts no force."""

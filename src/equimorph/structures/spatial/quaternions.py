@@ -18,9 +18,10 @@ Jet = Float[np.ndarray, "parts ..."]
 PAIRS: dict[int, tuple[tuple[tuple[int, int], ...], ...]] = {
     1: (((0, 0),),),
     2: (((0, 0),), ((0, 1), (1, 0))),
+    3: (((0, 0),), ((0, 1), (1, 0)), ((0, 2), (2, 0))),
     4: (((0, 0),), ((0, 1), (1, 0)), ((0, 2), (2, 0)), ((0, 3), (1, 2), (2, 1), (3, 0))),
 }
-"""Parts of two factors whose products add up to each part of the product."""
+"""Parts of two factors whose products add up to each part of the product; 3: none is mixed."""
 
 
 def product(a: Quaternions, b: Quaternions) -> Quaternions:
