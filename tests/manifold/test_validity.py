@@ -151,3 +151,32 @@ def test_a_rod_that_is_pressed_ends_where_it_has_no_length(space):
     within = [rod.max_curvature <= 1.0]
     eset = em.equilibrium_set(rod, em.Box(P=(0.0, 0.6)), within=within, intervals=(4,), checks=0)
     assert eset.coordinates.max() == pytest.approx(0.495, rel=1e-9)
+
+
+def column(space: bool) -> em.Frame | em.SpatialFrame:
+    """A member of length 2, EI = 1 and EA = 5 between a clamp and a head that moves along it."""
+    if space:
+        return em.SpatialFrame(
+            {"A": (0.0, 0.0, 0.0), "B": (0.0, 0.0, 2.0)},
+            [em.SpatialMember(("A", "B"), EI=1.0, EI_out=2.0, GJ=0.8, EA=5.0, normal=(1, 0, 0))],
+            {"A": "fixed", "B": {"x": "held", "y": "held", "rotation": "held"}},
+            {"P": {"B": (0.0, 0.0, -1.0)}},
+        )
+    return em.Frame(
+        {"A": (0.0, 0.0), "B": (0.0, 2.0)},
+        [em.Member(("A", "B"), EI=1.0, EA=5.0)],
+        {"A": "fixed", "B": {"x": "held", "angle": "held"}},
+        {"P": {"B": (0.0, -1.0)}},
+    )
+
+
+@pytest.mark.parametrize("space", [False, True])
+def test_a_member_that_is_pressed_ends_where_it_has_no_length(space):
+    """P (1 − P/EA) ≤ EA/4 < π²/4: the column never buckles and shortens by P/EA, to 0.99."""
+    frame = column(space)
+    pressed = em.lift(frame.natural_state(), {"P": 3.0}).end.state
+    assert frame.max_shortening(pressed) == pytest.approx(0.6, rel=1e-12)
+    assert frame.max_shortening == frame.descriptor("max_shortening")
+    within = [frame.max_curvature <= 1.0]
+    eset = em.equilibrium_set(frame, em.Box(P=(0.0, 6.0)), within=within, intervals=(4,), checks=0)
+    assert eset.coordinates.max() == pytest.approx(4.95, rel=1e-9)

@@ -21,6 +21,7 @@ from equimorph.model import (
     Support,
     remember_call,
 )
+from equimorph.structures.collapse import Shortening
 from equimorph.structures.frame.strength import StressedFrame
 from equimorph.structures.network import direction_of_mechanism
 from equimorph.structures.rod.discretisation import error_by_refinement
@@ -58,7 +59,7 @@ class Stretch(NamedTuple):
     shares: np.ndarray
 
 
-class AnyFrame(StressedFrame):
+class AnyFrame(StressedFrame, Shortening):
     """A frame: what its model says in the units of its user, and what is drawn of it."""
 
     stations: ClassVar[int]
@@ -365,6 +366,11 @@ class AnyFrame(StressedFrame):
         return MaterialPoints(self, places, np.outer(heavy, model.mesh.weights).ravel())
 
     # --- descriptors ----------------------------------------------------------------------------
+
+    @property
+    def may_collapse(self) -> bool:
+        """A member that stretches may be pressed together, too."""
+        return any(each.EA is not None for each in self.model.network.made)
 
     @property
     @remember_call

@@ -57,6 +57,11 @@ class FrameFields(FrameMechanics, AnyFrame):
         y = self.scalars(z, p)
         return np.stack([multiply(y, each.T) for each in self._reactions], axis=2)
 
+    def shortenings(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes points"]:
+        """Elastic shortenings of the axis at the points of every piece."""
+        own = 1.0 + self._fields(z, p)[2]
+        return np.asarray(1.0 - self.stretches(z, p)[1] / own)
+
     def couples(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes joints"]:
         """Couples of the supports on the joints."""
         model, y = self.model, self.scalars(z, p)

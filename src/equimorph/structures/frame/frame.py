@@ -38,6 +38,7 @@ class DescribedFrame(FrameFields):
         "moment(member,joint)": "moment",
         "max_curvature(member)": "member_curvature",
         "max_curvature": "max_curvature",
+        "max_shortening": "max_shortening",
         **Stressed.written,
         "max_strain(member)": "member_strain",
         "max_stress(member)": "member_stress",
@@ -274,8 +275,9 @@ class Frame(DescribedFrame):
 
     Members are unshearable, geometrically exact rods, straight or circular arcs as drawn, which is
     free of stress. Without EA they are inextensible; with it they have the energy ½ EA ε² per
-    length in addition to ½ EI (κ − κ₀)². They meet at rigid or hinged joints. Dead loads act on
-    joints or along members. x points right, y up; angles and couples count counterclockwise.
+    length in addition to ½ EI (κ − κ₀)², and sets end at ``max_shortening <= 0.99``. They meet at
+    rigid or hinged joints. Dead loads act on joints or along members. x points right, y up; angles
+    and couples count counterclockwise.
 
     Unknowns are the turns of Gauss–Lobatto nodes along the members; the multipliers are forces that
     balance without loads, one for each independent cycle of members and supports in x and in y.

@@ -90,6 +90,13 @@ class SpatialFrameFields(SpatialFrameMechanics, AnyFrame):
         """Forces of the supports on the joints."""
         return np.asarray(np.einsum("ls,sja->lja", self.scalars(z, p), self.model.forces.supports))
 
+    def shortenings(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes points"]:
+        """Elastic shortenings of the axis at the points of every piece."""
+        _, w, _, y = self.jets(z, p)
+        own = 1.0 + self.actuated(y)[1][0][:, self.model.owner, None]
+        shorter = 1.0 - self.tensions(w, y)[2][0] / own
+        return np.asarray(shorter.reshape(len(z), self.model.nodes.size))
+
     def couples(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes joints 3"]:
         """Couples of the supports on the joints; 0 where rotations are free."""
         made, found = self.model.network, self.body_couples(z, p)

@@ -94,6 +94,7 @@ class DescribedSpatialFrame(SpatialFrameFields):
         "hinge(member,joint)": "hinge",
         "max_curvature(member)": "member_curvature",
         "max_curvature": "max_curvature",
+        "max_shortening": "max_shortening",
         **Stressed.written,
         "max_strain(member)": "member_strain",
         "max_stress(member)": "member_stress",
@@ -236,9 +237,9 @@ class SpatialFrame(DescribedSpatialFrame):
     """Network of elastic rods in space, with displacements and rotations of any size.
 
     Members are unshearable, geometrically exact rods that bend about two axes and twist, straight
-    or circular arcs as drawn, which is free of stress. Without EA they are inextensible. They meet
-    at rigid joints, at ball joints, or at hinges about axes. Dead loads act on joints or along
-    members.
+    or circular arcs as drawn, which is free of stress. Without EA they are inextensible; with it
+    sets end at ``max_shortening <= 0.99``. They meet at rigid joints, at ball joints, or at hinges
+    about axes. Dead loads act on joints or along members.
 
     Unknowns are quaternions of Gauss–Lobatto nodes along the members, which rigidly joined members
     share, and angles of hinges; the multipliers are forces that balance without loads, three for
