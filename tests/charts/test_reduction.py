@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
 
 import equimorph as em
 import sets
@@ -9,6 +10,7 @@ from equimorph.charts.location import Found
 from equimorph.charts.quiet_paths import Unloaded
 from equimorph.charts.rules import first_of_each
 from equimorph.errors import InputError
+from equimorph.manifold.geometry.points import VertexKind
 from oracles.charted import lifted, spring_fold
 from oracles.polynomial import fold_form
 from typecheck import unchecked
@@ -170,6 +172,10 @@ def test_the_reduced_arch_agrees_with_single_paths(arch_set):
             assert np.abs(z - path.end.state.z).max() < 1e-7
     assert len(chart.barriers) > 0
     assert chart.lost <= 2
+    # states on the bound are ends of their paths: nothing is cut off just before it
+    capped = np.isin(arch_set.kinds, (VertexKind.CAP, VertexKind.CORNER))
+    gap, _ = cKDTree(arch_set.coordinates[capped]).query(chart.eset.coordinates[chart.cut])
+    assert gap.min() > 1e-6
 
 
 @pytest.mark.slow

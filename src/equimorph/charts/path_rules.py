@@ -10,7 +10,7 @@ from equimorph.argument_checks import check_arguments
 from equimorph.array_types import Bool, Float
 from equimorph.arrays import Lanes, Parameters, Points
 from equimorph.charts.location import Found
-from equimorph.charts.quiet_paths import QuietPaths, Unloaded
+from equimorph.charts.quiet_paths import AT_END, QuietPaths, Unloaded
 from equimorph.charts.rules import (
     Choice,
     Identity,
@@ -22,7 +22,7 @@ from equimorph.charts.rules import (
 )
 from equimorph.charts.score_changes import shares_of_ends
 from equimorph.equilibria import ParameterLine, TraceOptions
-from equimorph.equilibria.first_stable import OFF, STABLE, FirstStable
+from equimorph.equilibria.first_stable import BOUND, OFF, STABLE, FirstStable
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import remember_call
@@ -30,7 +30,7 @@ from equimorph.structures import Structure
 
 MATCH = 1e-4
 """Distance in the metric below which a state is the end of a path."""
-BOUND = 100.0
+LARGEST = 100.0
 """Largest load up to which paths are followed, unless said."""
 Ends = Callable[[Lanes, Parameters, Parameters], Lanes]
 """States at the ends of paths from unloaded states, their parameters, and those of the ends."""
@@ -55,7 +55,7 @@ def quasi_static(parameter: str) -> Rule:
 
 @remember_call
 @check_arguments
-def first_stable_on_path(parameter: str, bound: float = BOUND) -> Rule:
+def first_stable_on_path(parameter: str, bound: float = LARGEST) -> Rule:
     """Prefer the first stable state on the path from the natural state, through unstable parts too.
 
     The rule of curvature maps. A real structure may have snapped on the way.
@@ -96,7 +96,7 @@ def rule_from(identity: Mapping[str, Any], structure: Structure) -> Rule:
         "nearest": lambda: nearest(int(identity["of"])),
         "quasi_static": lambda: quasi_static(identity["parameter"]),
         "first_stable_on_path": lambda: first_stable_on_path(
-            identity["parameter"], float(identity.get("bound", BOUND))
+            identity["parameter"], float(identity.get("bound", LARGEST))
         ),
     }
     if identity["rule"] not in known:
@@ -162,7 +162,11 @@ def _first(eset: EquilibriumSet, start: Unloaded, bound: float) -> Ends:
     paths = FirstStable(eset.structure, start.load, start.low, bound, eset.constraints, options)
 
     def ends(z: Lanes, begin: Parameters, goal: Parameters) -> Lanes:
-        found, _, way = paths(z, begin, goal[:, start.load])
-        return np.where(((way >= STABLE) & (way <= OFF))[:, None], found, np.nan)
+        at = goal[:, start.load]
+        found, p, way = paths(z, begin, at)
+        # states on a bound: round-off decides whether their paths arrive or just fail to
+        missed = np.abs(p[:, start.load] - at) / np.abs(at - begin[:, start.load])
+        there = ((way >= STABLE) & (way <= OFF)) | ((way == BOUND) & (missed < AT_END))
+        return np.where(there[:, None], found, np.nan)
 
     return ends
