@@ -12,9 +12,11 @@ from itertools import combinations, islice
 
 import numpy as np
 
+from equimorph.array_types import Float
 from equimorph.arrays import Some, Values
 from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.queries.nearest import SetPoints
+from equimorph.structures import States
 from equimorph.tasks.optimising.certificates import curvatures
 from equimorph.tasks.optimising.programme import Expansion, Programme, is_stability
 from equimorph.tasks.optimising.quadratic import Quadratic, QuadraticStep, kkt_points
@@ -34,6 +36,14 @@ MOST = 24
 """Sets of functions that are tried, the smallest first."""
 NEGATIVE = 1e-6
 """Size of a negative multiplier that counts as zero."""
+SHARES = (0.5, 0.1, 0.02, 4e-3, 8e-4, 1.6e-4)
+"""Shares, tried in turn, of the room above a pass that are spent on the distance from bounds."""
+DOWN = 0.9
+"""How far both ends of the way over a pass lie below its allowed height, relative to the room."""
+WIDENED = 3.0
+"""Largest distance from active bounds down a pass, relative to that on it."""
+STATIONS = 41
+"""Number of states that lead over a pass."""
 
 
 @dataclass(frozen=True)
@@ -204,3 +214,69 @@ def _holds(programme: Programme, found: CriticalPoint) -> bool:
     room = FEASIBLE * (1.0 + abs(level))
     inside = e.g.max(initial=-np.inf) <= FEASIBLE and e.f.max() <= level + room
     return bool(down == 1 and (stable or on_edge) and signs and inside)
+
+
+def states_over(
+    programme: Programme, found: CriticalPoint, reach: float, room: float
+) -> States | None:
+    """States over a pass, inside all active bounds, that are hardly higher.
+
+    With ``f ≈ c − ½ |λ| s² + ν δ + ½ η δ²`` a step s down the pass leaves room for a distance δ
+    from the bounds. Stations are denser where there is less of it.
+
+    Parameters
+    ----------
+    programme
+        Objective and bounds.
+    found
+        The pass.
+    reach
+        How far from it they lead, in the metric and scaled parameters.
+    room
+        How far they may exceed its value.
+
+    Returns
+    -------
+    States from one side to the other; None where no share of the room leads down on both sides.
+    """
+    own, bounds = found.binding
+    curvature, ways = curvatures(found, own, bounds)
+    scale = np.sqrt(2.0 * room / -curvature[0])
+    turn = np.arcsinh(reach / scale)
+    along = scale * np.sinh(turn * np.linspace(-1.0, 1.0, STATIONS))
+    gain = room - 0.5 * curvature[0] * along**2
+    highest = float(found.expansion.f[0].max()) + room
+    for share in SHARES if len(bounds) else (0.0,):
+        distance = _clearances(found, share * gain)
+        distance = np.minimum(distance, WIDENED * min(distance.min(), share * reach))
+        steps = found.inside(along[:, None] * ways[:, 0], distance)
+        states, good = found.beside(programme.setting, steps)
+        value = programme.objective.values(states.z, states.p)
+        good &= (value <= highest) & (states.index == 0)
+        good &= programme.excess(states.z, states.p).max(axis=1) <= 0.0
+        run = _run_between_lows(np.where(good, value, np.inf))
+        # far from the bounds the expansion may have no meaning: no way down on one side
+        if good[STATIONS // 2] and value[[run.start, run.stop - 1]].max() <= highest - DOWN * room:
+            return states[run]
+    return None
+
+
+def _clearances(found: CriticalPoint, gain: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
+    """Distances δ from the active bounds with ``ν δ + ½ η δ² = gain``."""
+    bounds, e = found.binding[1], found.expansion
+    if len(bounds) == 0:
+        return np.zeros(len(gain))
+    inwards = found.inside(np.zeros((1, len(found.frames[0]))), np.ones(1))[0]
+    pressure = max(float(-found.answer.multipliers @ e.g_slope[0] @ inwards), 0.0)
+    bend = max(float(inwards @ e.bend(0, found.answer) @ inwards), 0.0)
+    rise = pressure + np.sqrt(pressure**2 + 2.0 * bend * gain)
+    return np.asarray(2.0 * gain / np.maximum(rise, 1e-300))
+
+
+def _run_between_lows(value: Float[np.ndarray, " n"]) -> slice:
+    """Numbers around the middle without infinite ones, from the lowest on one side to the other."""
+    middle, shut = len(value) // 2, np.flatnonzero(np.isinf(value))
+    first = int(shut[shut < middle].max(initial=-1)) + 1
+    end = int(shut[shut > middle].min(initial=len(value)))
+    low, high = value[first : middle + 1].argmin(), value[middle:end].argmin()
+    return slice(first + int(low), middle + int(high) + 1)

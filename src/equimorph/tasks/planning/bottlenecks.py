@@ -20,8 +20,8 @@ from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.queries.nearest import SetPoints, cells_around, points_at_vertices
 from equimorph.model import Constraint
 from equimorph.structures import State, States, join_states
-from equimorph.tasks.optimising.certificates import certificate, curvatures
-from equimorph.tasks.optimising.passes import AROUND, passes_near
+from equimorph.tasks.optimising.certificates import certificate
+from equimorph.tasks.optimising.passes import AROUND, passes_near, states_over
 from equimorph.tasks.optimising.programme import Objective, Programme, stability
 from equimorph.tasks.optimising.sqp import CriticalPoint
 from equimorph.tasks.optimising.tangent_steps import project_onto_set
@@ -38,18 +38,10 @@ BELOW_ENDS = 6
 """Of these, places not above the ends, where a pass may hide between vertices."""
 JUMP = 0.02
 """Difference of the places of extrema along the structure beyond which they are different ones."""
-SHARES = (0.5, 0.1, 0.02, 4e-3, 8e-4, 1.6e-4)
-"""Shares, tried in turn, of the room above a pass that are spent on the distance from bounds."""
 BESIDE = 3
 """Facets of a way before and after one at which exact states tell whether it is right."""
 SAME_VALUE = 1e-7
 """Difference from the ends, relative to the range of the objective on the way, that is none."""
-DOWN = 0.9
-"""How far both ends of the way over a pass lie below its allowed height, relative to the room."""
-WIDENED = 3.0
-"""Largest distance from active bounds down a pass, relative to that on it."""
-STATIONS = 41
-"""Number of states that lead over a pass."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -313,7 +305,7 @@ class _Search:
         else:
             bottleneck = self._vertex(facet) if found is None else self._pass(found[0])
         room = self._room(self.extreme.sign * bottleneck.value, size)
-        over = None if found is None else self._over(*found, room)
+        over = None if found is None else states_over(self.programme, *found, room)
         bound = self.extreme.bound(bottleneck.value, room)
         point, reach = (None, 0.0) if found is None or at_end else found
         way_over = self._states_along(way, facet, over, bound)
@@ -366,55 +358,3 @@ class _Search:
         kinds: dict[str, BottleneckKind] = {"interior": "saddle", "stability boundary": "fold"}
         kind: BottleneckKind = kinds.get(known.kind, known.kind)  # type: ignore[arg-type]
         return Bottleneck(value, state, kind, known.residual, tuple(known.active))
-
-    def _over(self, found: CriticalPoint, reach: float, room: float) -> States | None:
-        """States over a pass, inside all active bounds, that are hardly higher.
-
-        With ``f ≈ c − ½ |λ| s² + ν δ + ½ η δ²`` a step s down the pass leaves room for a distance δ
-        from the bounds. Stations are denser where there is less of it.
-        """
-        programme, (own, bounds) = self.programme, found.binding
-        curvature, ways = curvatures(found, own, bounds)
-        scale = np.sqrt(2.0 * room / -curvature[0])
-        turn = np.arcsinh(reach / scale)
-        along = scale * np.sinh(turn * np.linspace(-1.0, 1.0, STATIONS))
-        gain = room - 0.5 * curvature[0] * along**2
-        highest = float(found.expansion.f[0].max()) + room
-        for share in SHARES if len(bounds) else (0.0,):
-            distance = self._clearances(found, share * gain)
-            distance = np.minimum(distance, WIDENED * min(distance.min(), share * reach))
-            steps = found.inside(along[:, None] * ways[:, 0], distance)
-            states, good = found.beside(programme.setting, steps)
-            value = programme.objective.values(states.z, states.p)
-            good &= (value <= highest) & (states.index == 0)
-            good &= programme.excess(states.z, states.p).max(axis=1) <= 0.0
-            run = _run_between_lows(np.where(good, value, np.inf))
-            # far from the bounds the expansion may have no meaning: no way down on one side
-            if (
-                good[STATIONS // 2]
-                and value[[run.start, run.stop - 1]].max() <= highest - 0.9 * room
-            ):
-                return states[run]
-        return None
-
-    def _clearances(
-        self, found: CriticalPoint, gain: Float[np.ndarray, " n"]
-    ) -> Float[np.ndarray, " n"]:
-        """Distances δ from the active bounds with ``ν δ + ½ η δ² = gain``."""
-        bounds, e = found.binding[1], found.expansion
-        if len(bounds) == 0:
-            return np.zeros(len(gain))
-        inwards = found.inside(np.zeros((1, len(found.frames[0]))), np.ones(1))[0]
-        pressure = max(float(-found.answer.multipliers @ e.g_slope[0] @ inwards), 0.0)
-        bend = max(float(inwards @ e.bend(0, found.answer) @ inwards), 0.0)
-        rise = pressure + np.sqrt(pressure**2 + 2.0 * bend * gain)
-        return np.asarray(2.0 * gain / np.maximum(rise, 1e-300))
-
-
-def _run_between_lows(value: Float[np.ndarray, " n"]) -> slice:
-    """Numbers around the middle without infinite ones, from the lowest on one side to the other."""
-    middle, shut = len(value) // 2, np.flatnonzero(np.isinf(value))
-    first = int(shut[shut < middle].max(initial=-1)) + 1
-    end = int(shut[shut > middle].min(initial=len(value)))
-    low, high = value[first : middle + 1].argmin(), value[middle:end].argmin()
-    return slice(first + int(low), middle + int(high) + 1)
