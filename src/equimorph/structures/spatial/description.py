@@ -27,10 +27,9 @@ from equimorph.structures.spatial.model import (
     raw_model,
     raw_names,
 )
-from equimorph.structures.spatial.phase import (
+from equimorph.structures.spatial.phase import OrbitMechanics, PinnedMechanics
+from equimorph.structures.spatial.phase_condition import (
     BROKEN_BY,
-    OrbitMechanics,
-    PinnedMechanics,
     check_orbits,
     obstacle,
     with_phase_condition,
