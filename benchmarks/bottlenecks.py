@@ -1,6 +1,8 @@
 """Random questions for the lowest peak, on grids of 1×, 2× and 4× the intervals, that must agree.
 
-Run it: python benchmarks/bottlenecks.py [arch|strip|truss] [questions]
+Run it: python benchmarks/bottlenecks.py [arch|strip|truss] [questions] [plan]
+
+With "plan" it counts instead how often `plan` arrives just above the lowest peak and not below it.
 """
 
 import sys
@@ -13,10 +15,15 @@ import numpy as np
 import equimorph as em
 from equimorph.tasks.planning.bottlenecks import find_bottleneck
 from equimorph.tasks.planning.objectives import Extreme
+from equimorph.tasks.route import Bottleneck
 
 GRIDS = (1, 2, 4)
 SAME = 1e-7
 """Largest difference of values on the grids, relative to the value, but at least to one."""
+BESIDE = 2e-3
+"""How far bounds lie above and below a peak, relative to it and its height above the ends."""
+FROM_ENDS = 20
+"""Peaks at an end that `plan` confirms; of all others, each one."""
 
 
 def arch() -> tuple[list[em.EquilibriumSet], list[em.Descriptor]]:
@@ -78,6 +85,37 @@ def random_state(eset: em.EquilibriumSet, rng: np.random.Generator) -> em.State:
             return found[int(rng.integers(len(found)))]
 
 
+def arrives(
+    eset: em.EquilibriumSet, ends: tuple[em.State, em.State], wish: Extreme, found: Bottleneck
+) -> tuple[bool, bool]:
+    """Whether `plan` arrives under a bound just above a peak, and just below."""
+    heights = [float(wish.descriptor(each)) for each in ends]
+    size = max(1e-3, abs(found.value), *(abs(found.value - each) for each in heights))
+    bounds = (wish.bound(found.value, side * BESIDE * size) for side in (1.0, -1.0))
+    above, below = (em.plan(eset, *ends, within=[each]).arrived for each in bounds)
+    return above, below
+
+
+def confirm(name: str, questions: int) -> None:
+    """Print how often `plan` arrives just above and just below the peaks of each kind."""
+    warnings.simplefilter("ignore")
+    grids, more = {"arch": arch, "strip": strip, "truss": truss}[name]()
+    eset, rng, counts = grids[0], np.random.default_rng(0), Counter[tuple[str, bool, bool]]()
+    wished, at_ends = wishes(eset, more), 0
+    for _ in range(questions):
+        ends = random_state(eset, rng), random_state(eset, rng)
+        wish = wished[int(rng.integers(len(wished)))]
+        passing = find_bottleneck(eset, ends, wish)
+        if passing is None:
+            continue
+        found = passing.bottleneck
+        at_ends += found.kind in ("start", "goal")
+        if found.kind not in ("start", "goal") or at_ends <= FROM_ENDS:
+            counts[(found.kind, *arrives(eset, ends, wish, found))] += 1
+    for (kind, above, below), count in sorted(counts.items()):
+        sys.stdout.write(f"{name}: {count} of kind {kind}: above {above}, below {below}\n")
+
+
 def main(name: str = "arch", questions: int = 200) -> None:
     """Print what disagrees, and how long the answers took."""
     warnings.simplefilter("ignore")
@@ -109,4 +147,7 @@ def main(name: str = "arch", questions: int = 200) -> None:
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:2], *map(int, sys.argv[2:3]))
+    if sys.argv[3:] == ["plan"]:
+        confirm(sys.argv[1], int(sys.argv[2]))
+    else:
+        main(*sys.argv[1:2], *map(int, sys.argv[2:3]))

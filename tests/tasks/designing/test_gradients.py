@@ -39,15 +39,28 @@ def strip_value(of):
     return family, em.StateValue(here, of(first))
 
 
-def truss_limit():
+def truss_limit(deepest=None):
     family, first = start_of(truss, TRUSS)
-    return family, em.LoadLimit(first.natural_state(), "F")
+    within = [] if deepest is None else [first.displacement("B", "y") >= deepest]
+    return family, em.LoadLimit(first.natural_state(), "F", within)
 
 
-def truss_value():
+def truss_value(of):
     family, first = start_of(truss, TRUSS)
     here = em.lift(first.natural_state(), {"F": 0.001}).end.state
-    return family, em.StateValue(here, em.least(em.margin_of(first)))
+    return family, em.StateValue(here, of(first))
+
+
+def work_of_both(rod):
+    return em.function_of("both", lambda a, b: a * b, *efforts_of(rod))
+
+
+def larger_effort(rod):
+    return em.largest_of("larger", *map(abs, efforts_of(rod)))
+
+
+def efforts_of(rod):
+    return [em.effort_of(rod, name) for name in ("Theta", "Delta")]
 
 
 CASES = {
@@ -60,7 +73,21 @@ CASES = {
     "margin of the strip": (lambda: strip_value(lambda a: em.least(em.margin_of(a))), 3),
     "curvature of the strip": (lambda: strip_value(lambda a: em.peak(a.max_curvature)), 3),
     "fold of the truss": (truss_limit, 2),
-    "margin of the truss": (truss_value, 2),
+    "margin of the truss": (lambda: truss_value(lambda a: em.least(em.margin_of(a))), 2),
+    "other effort of the arch": (
+        lambda: arch_value(lambda a: em.peak(em.effort_of(a, "Theta"))),
+        6,
+    ),
+    "crown of the arch": (lambda: arch_value(lambda a: em.least(a.height(0.5))), 6),
+    "quarter of the arch": (lambda: arch_value(lambda a: em.peak(a.height(0.25))), 6),
+    "product of efforts": (lambda: arch_value(lambda a: em.peak(work_of_both(a))), 6),
+    "larger effort": (lambda: arch_value(lambda a: em.peak(larger_effort(a))), 6),
+    "middle of the strip": (lambda: strip_value(lambda a: em.peak(a.height(0.5))), 3),
+    "effort of the strip": (lambda: strip_value(lambda a: em.peak(em.effort_of(a, "P"))), 3),
+    "pull of the strip": (lambda: strip_value(lambda a: em.peak(em.effort_of(a, "H"))), 3),
+    "effort of the truss": (lambda: truss_value(lambda a: em.peak(em.effort_of(a, "F"))), 2),
+    "sinking of the truss": (lambda: truss_value(lambda a: em.least(a.displacement("B", "y"))), 2),
+    "sinking of the truss under load": (lambda: truss_limit(-0.01), 2),
 }
 
 
@@ -88,7 +115,7 @@ FAST = ("fold of the arch", "fold of the truss", "margin of the truss")
     ],
 )
 def test_gradients_are_those_of_differences(case, count):
-    """43 derivatives of limit loads, margins, curvatures, efforts: arch, strip, truss."""
+    """Of limit loads, margins, curvatures, efforts, places: arch, strip, truss."""
     with unchecked():
         family, question = case()
         x = family.start
