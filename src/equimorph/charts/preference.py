@@ -44,7 +44,7 @@ DIFFERENT = 1e-4
 BESIDE, MOVED = 0.02, 0.3
 """Distance from a fold, in lengths of edges, at which the preference is examined, and the largest
 distance of its state there: at a cusp it is the cube root of the first."""
-PARTS, BATCH, ROUNDS, LOCATED = (3, 32), 800, 24, 3.0**-16
+PARTS, BATCH, ROUNDS, LOCATED = (3, 64), 800, 24, 3.0**-16
 """Fewest and most parts into which an edge is divided in a round, and states that are examined in
 one: few take nearly as long as many. Rounds, and the share of an edge, 2e-8, to which the change is
 located."""
