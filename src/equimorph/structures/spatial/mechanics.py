@@ -218,7 +218,13 @@ class SpatialMechanics(SpatialLagrangian, JointEquations):
         return self.pivot(found, z, p, rhs, around, shift)
 
     def eliminate(
-        self, z: Lanes, p: Parameters, rhs: Sides, around: Border, shift: Shift, springs: Lanes
+        self,
+        z: Lanes,
+        p: Parameters,
+        rhs: Sides,
+        around: Border,
+        shift: Shift,
+        springs: Float[np.ndarray, "lanes parts"],
     ) -> BorderedSolution:
         """The compiled solve, with the springs of its kernel; lanes to be pivoted are flagged."""
         lanes = len(z)

@@ -123,7 +123,9 @@ class PinnedMechanics(SpatialMechanics):
         names, m = ("μ", *self.model.names), self.constraints - 1
         return SpatialMechanics(replace(self.model, multipliers=m, names=names))
 
-    def _springs(self, z: Lanes) -> tuple[Lanes, Lanes]:
+    def _springs(
+        self, z: Lanes
+    ) -> tuple[Float[np.ndarray, "lanes 4"], Float[np.ndarray, "lanes bare"]]:
         """Springs of `solve_bordered_lanes`, and w·φ_v by the unknowns without μ.
 
         At the vertex that ξ moves most, along ξ = (0, 0, −q₃, q₂); none on the axis.
