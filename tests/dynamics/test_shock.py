@@ -160,38 +160,43 @@ def test_states_without_a_barrier_have_no_shock_and_bad_ones_are_refused(well):
 
 
 @pytest.mark.slow
-def test_the_least_impulse_of_an_arch_is_confirmed_by_mujoco():
-    """Blows on the crown, in the two lowest modes, on a chain of 40 rigid links.
+@pytest.mark.parametrize("damping", [0.01, 0.05])
+def test_the_least_impulse_of_an_arch_is_confirmed_by_mujoco(damping):
+    """Blows on the crown, in the two lowest modes, on a chain of 40 rigid links, within 10 %.
 
-    Links are damped in proportion to their stiffness, the rod to its mass: with little damping both
-    least impulses tend to the same one, here within 15 %.
+    Both are damped in proportion to their mass: joints have no damping of their own, and between
+    steps all rates of the chain decay by exp(−c dt), the exact flow of M q̈ = −c M q̇.
     """
     pytest.importorskip("mujoco", reason="MuJoCo is not installed (extra `replay`)")
-    arch, used = em.Rod(), em.ReplaySettings(step=0.04, damping=0.01)
+    arch, used = em.Rod(), em.ReplaySettings(step=0.04, damping=damping)
     start = em.lift(arch.natural_state(Theta=1.0), {"q": 2.5}).end.state
     crown = arch.height(0.5)
     slope = Pushed(arch, crown, 1.0, 1.0).gradient(start.z[None], np.append(start.p, 0.0)[None])[0]
     saddle = em.transition_network(arch, start.parameters).barrier(start).saddle
-    impulse = _Trial(start, saddle, used, 2).impulse(crown, slope)
+    trial = _Trial(start, saddle, used, 2)
+    impulse = trial.impulse(crown, slope)
     modes = vibrations(arch, start.z[None], start.p[None], 2).modes[0]
     way = np.zeros(arch.size)
     way[: arch.unknowns] = 1e-5 * modes.T @ (modes @ slope)
     model = model_of(start, "mujoco", 40)
     settings, places = model.settings(start.p), []
+    decay = np.exp(-0.02 * trial.clock.rate)
     for moved in (start.z + way, start.z - way):
         links = model._chained.entries(em.State(arch, moved, start.p))
-        chain = model.plant(start, 0.02, used.damping)._plant
+        chain = model.plant(start, 0.02, 0.0)._plant
         chain.start(model.linkage.prescribe(links, settings), settings)
         places.append(chain.data.qpos.copy())
 
     def snaps(size):
-        plant = model.plant(start, 0.02, used.damping)
-        plant._plant.data.qvel[:] = size * (places[0] - places[1]) / 2e-5
+        plant = model.plant(start, 0.02, 0.0)
+        rates = plant._plant.data.qvel
+        rates[:] = size * (places[0] - places[1]) / 2e-5
         for _ in range(5000):
             plant.step()
+            rates *= decay
         rest = landing(arch, plant.guess(), start.p)
         return np.sqrt(arch.mass @ (rest.z - start.z)[: arch.unknowns] ** 2) > SAME_SOLUTION
 
     assert not snaps(0.95 * np.sign(impulse.value) * impulse.bound)
-    assert not snaps(0.85 * impulse.value)
-    assert snaps(1.15 * impulse.value)
+    assert not snaps(0.9 * impulse.value)
+    assert snaps(1.1 * impulse.value)

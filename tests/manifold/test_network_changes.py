@@ -1,5 +1,7 @@
 """Curves on which networks change: against the roots of polynomials, and by symmetry."""
 
+from itertools import permutations
+
 import numpy as np
 import pytest
 from scipy.optimize import brentq
@@ -70,3 +72,25 @@ def test_the_spring_swaps_without_a_load_and_its_figure_is_drawn():
     assert "2 curves on which minima swap order, 0 on which" in repr(found)
     labels = [line.get_label() for line in plotting.network_changes(found).lines]
     assert "two minima swap order" in labels
+
+
+@pytest.mark.slow
+def test_where_descents_of_an_arch_begin_to_end_elsewhere_their_landing_folds():
+    """In each such cell the lift of a landing from one corner to another one ends at a fold."""
+    arch = em.Rod()
+    box = em.Box(Theta=(0.6, 1.6), Delta=(-1.4, 1.4))
+    with unchecked():
+        eset = em.equilibrium_set(arch, box, fixed={"q": 2.5}, intervals=(20, 40))
+        field = em.barriers(eset)
+        landings, names = field.landings, [each.name for each in arch.parameters]
+        cells = eset.cells[landings.row >= 0]
+        assert np.count_nonzero(field.changing) > 10
+        for cell in np.flatnonzero(field.changing):
+            p, ends = eset.points.p[cells[cell]], landings.ends[cell]
+            kinds = []
+            for side in np.flatnonzero(~np.isfinite(landings.radius[cell])):
+                for one, other in permutations(range(len(p)), 2):
+                    landing = em.State(arch, ends[one, side], p[one])
+                    led = em.lift(landing, dict(zip(names, p[other], strict=True)))
+                    kinds.append(led.end.kind)
+            assert "fold" in kinds

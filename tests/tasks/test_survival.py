@@ -229,3 +229,19 @@ def test_correlations_are_checked():
             Errors({"F": 1.0, "x_l": 1.0}, 0.9, matrix)
     with pytest.raises(InputError, match="beside a probability"):
         Errors({"F": 1.0}, None, [[1.0]])
+
+
+def test_a_route_for_barriers_survives_errors_and_is_the_safer_one():
+    """The box is proved, the least barrier is twice that of the shortest route that survives."""
+    spring, errors = Spring(), {"x_l": 0.005, "F": 0.003}
+    box = em.Box(x_l=(0.6, 1.3), F=(-0.1, 0.1))
+    eset = em.equilibrium_set(spring, box, intervals=(14, 10))
+    field = em.barriers(eset)
+    goal, *_, start = sorted(eset.at(x_l=0.8, F=0.01).stable, key=spring.elevation)
+    least = []
+    for wish in ("length", field.descriptor):
+        route = em.plan(eset, start, goal, objective=wish, survive=errors)
+        assert (route.arrived, route.survival.status) == (True, "proved")
+        least.append(field.of(route.states).energy.min())
+    assert least[1] > 2.0 * least[0]
+    assert random_trials(start, route.schedule, errors, trials=50).arrived.all()

@@ -80,9 +80,9 @@ def plan(  # noqa: PLR0913  # the knobs of the public face, most by keyword
         happens where on its fold the route is cheapest; no route is dearer than one without.
     survive
         Errors that the route has to survive, by name: half widths of a box, or `Errors`. A box is
-        proved, and a probability shown by random trials; see `survival`, whose answer is
-        `route.survival`. Where the route does not survive, others with larger margins are tried.
-        Way-points are judged as they are; snaps are not allowed.
+        proved or, by sampled bounds, supported, a probability shown by trials; `route.survival` is
+        the answer of `survival`. Where the route does not survive, others with larger margins are
+        tried. Way-points are judged as they are; snaps are not allowed.
     monitor
         Descriptors to record in the schedule, in addition to those of the constraints.
 

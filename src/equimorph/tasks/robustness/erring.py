@@ -48,7 +48,7 @@ class Errors:
         deviations.
     probability
         With which the route has to survive, shown by random trials; None: it must do so for all
-        errors of the box, which is proved.
+        errors of the box, which is proved, or supported where bounds are sampled.
     correlation
         Matrix of the correlations of the errors, in the order of `sizes`; with a probability only.
     trials

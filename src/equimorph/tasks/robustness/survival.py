@@ -1,4 +1,4 @@
-"""`survival`: whether a schedule is executed without a snap under errors, proved or by trials."""
+"""`survival`: whether a schedule is executed without a snap under errors, by bounds or trials."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -74,7 +74,7 @@ class SurvivalRoom:
     Parameters
     ----------
     proved
-        Largest multiple for which survival was proved, or supported; 0 if none was.
+        Largest multiple for which survival was proved or, by sampled bounds, supported; 0: none.
     survived
         Largest multiple for which all trials arrived: at most little above the true one.
     open
@@ -90,7 +90,7 @@ class SurvivalRoom:
 
     def __repr__(self) -> str:
         """Both multiples."""
-        return f"SurvivalRoom(proved {self.proved:.4g}, survived {self.survived:.4g}: {self.met})"
+        return f"SurvivalRoom(shown {self.proved:.4g}, survived {self.survived:.4g}: {self.met})"
 
 
 @check_arguments
@@ -101,7 +101,7 @@ def survival_room(
     *,
     within: Sequence[Constraint] = (),
 ) -> SurvivalRoom:
-    """Widest box of errors that a schedule survives: proved, and true by bisection of trials.
+    """Widest box of errors that a schedule survives: shown by bounds, and by bisection of trials.
 
     Parameters
     ----------
@@ -116,7 +116,7 @@ def survival_room(
 
     Returns
     -------
-    The largest multiples of the box, to 1 % (trials) and 5 % (proofs).
+    The largest multiples of the box, to 1 % (trials) and 5 % (bounds).
 
     Raises
     ------

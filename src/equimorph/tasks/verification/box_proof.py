@@ -43,7 +43,7 @@ class BoxProof:
         Half widths, for each unknown and multiplier, of the boxes around the tangent plane at the
         middle of each cell, in which the sheet is the only one.
     margin
-        Stability margin that the whole sheet keeps, 0 if unproved.
+        Stability margin that the whole sheet keeps, by bounds of this kind; 0 if unproved.
     bounds
         As of `Proof`.
     failed
@@ -74,13 +74,13 @@ class BoxProof:
 
 @check_arguments
 def certify_box(state: State, box: Box, *, margin: float = 0.0, most: int = 10_000) -> BoxProof:
-    """Prove that the sheet of a stable state goes on, stable, over a whole box of parameters.
+    """Prove, or support, that a sheet of stable states goes on over a whole box of parameters.
 
     Then any motion within the box that starts on this sheet stays on it, without a snap. The box is
-    bisected, across the parameter that moves the states most, until every cell is proved; other
-    parameters keep their values. The sheet is that which a straight lift from the state to the
-    middle of the box leads to. Outcomes other than a proof are named in `why`: an unstable or
-    missing state, or the work is spent, as must happen where the margin vanishes.
+    bisected, across the parameter that moves the states most, until the bounds, enclosed or sampled
+    (`ProofStatus`), hold in every cell; other parameters keep their values. The sheet is that which
+    a straight lift from the state to the middle of the box leads to. Failures are named in `why`:
+    an unstable or missing state, or the work is spent, as must happen where the margin vanishes.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ def certify_box(state: State, box: Box, *, margin: float = 0.0, most: int = 10_0
     box
         Ranges of parameters.
     margin
-        Least stability margin to be proved.
+        Least stability margin to be shown.
     most
         Cells that are tried at most.
 
