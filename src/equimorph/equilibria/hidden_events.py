@@ -161,9 +161,9 @@ def fronts(curve: Curve, points: Points, near: Some) -> Front:
     return Front(z, t, *tangent, points.index[near])
 
 
-VANISHED, LOCATED = 1e-4, 1e-8
-"""Eigenvalue, relative to the small ones at the start of the path, that counts as zero; that of a
-simple fold where it is located."""
+VANISHED, PARTED = 1e-4, 1e-6
+"""Eigenvalue, relative to the small ones at the start of the path, that counts as zero; the least
+second one at a simple fold: round-off parts eigenvalues that vanish together by its root, 1e-7."""
 
 
 def with_multiple_points(
@@ -174,7 +174,7 @@ def with_multiple_points(
     One border row removes one null vector: where two eigenvalues vanish together, as symmetry or
     equal parts make them do, steps shrink until the lane is lost, within round-off of the point,
     or it ends as at a fold if their number is odd. The inertia of F_z ∓ εM counts the eigenvalues
-    within ±ε. A fold with another small eigenvalue is located to round-off: one vanishes alone.
+    within ±ε. A fold with another small eigenvalue is located so well that one vanishes alone.
 
     Parameters
     ----------
@@ -207,7 +207,7 @@ def _several(curve: Curve, start: Lanes, outcome: Traces, ended: Some) -> list[i
     small = _small_eigenvalue(structure, *begun)
     count = multiplicity(structure, z, p, VANISHED * small)
     folds = np.flatnonzero((count > 1) & (outcome.code[ended] == EventCode.FOLD))
-    alone = multiplicity(structure, z[folds], p[folds], LOCATED * small[folds]) == 1
+    alone = multiplicity(structure, z[folds], p[folds], PARTED * small[folds]) == 1
     count[folds[alone]] = 1
     return [int(n) for n in count]
 

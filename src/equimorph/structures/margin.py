@@ -102,14 +102,14 @@ def _by_pairs(
     """Margins of states without eigenvalues below `start`, and which of them are proved."""
     value, proved = np.empty(len(z)), np.zeros(len(z), bool)
     todo, vectors = np.arange(len(z)), np.tile(_first_pair(structure), (len(z), 1, 1))
-    shift, known = start.copy(), np.full(len(z), np.inf)
+    shift, known = start.copy(), np.full(len(z), np.nan)
     for sweep in range(SWEEPS):
         vectors, first, second, stable = _swept(structure, z[todo], p[todo], shift, vectors)
         change = np.abs(known - first)
         # one more sweep would shrink the error by this factor
         left = ((first - shift) / np.maximum(second - shift, NEAR * np.abs(second))) ** 2
         tolerance = error * np.maximum(np.abs(first), 1e-3)
-        settled = stable & (sweep > 0) & (change * left <= tolerance)
+        settled = stable & (change * left <= tolerance)  # not in the first sweep: NaN
         value[todo[settled]], proved[todo[settled]] = first[settled], True
         more = stable & ~settled
         if not more.any():
