@@ -8,7 +8,7 @@ from multiprocessing import get_context
 import pytest
 
 import equimorph as em
-from equimorph.model.workers import LEAST, MOST, cut_rows
+from equimorph.model.journal import LEAST, MOST, cut_rows
 from same_records import assert_equal
 from typecheck import unchecked
 

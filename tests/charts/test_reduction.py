@@ -7,7 +7,7 @@ from scipy.spatial import cKDTree
 import equimorph as em
 import sets
 from equimorph.charts.location import Found
-from equimorph.charts.quiet_paths import Unloaded
+from equimorph.charts.path_rules import Unloaded
 from equimorph.charts.rules import first_of_each
 from equimorph.errors import InputError
 from equimorph.manifold.geometry.points import VertexKind

@@ -10,9 +10,8 @@ from equimorph.arrays import Flags, Values
 from equimorph.control.belief import Belief, ControlStatus
 from equimorph.control.estimate import Estimate, Measurement, fitted
 from equimorph.control.likely import Bundles, LikelyLoads, moved, positions
-from equimorph.control.moving_target import MovingTarget
 from equimorph.control.safe_routes import route_is_safe, safe_route
-from equimorph.control.strides import Step, Strides, ahead_of, setting_of
+from equimorph.control.strides import MovingTarget, Step, Strides, ahead_of, setting_of
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Constraint, Descriptor

@@ -1,15 +1,64 @@
-"""Strides of the actuators, none beyond what is safe under all likely loads."""
+"""Strides of the actuators towards targets that may move, none beyond what is safe.
+
+Safe is what holds under all likely loads.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from equimorph.array_types import Float
 from equimorph.arrays import Values
 from equimorph.control.likely import Bundles, LikelyLoads, Places, moved
-from equimorph.model import Box
+from equimorph.model import Box, Descriptor
 from equimorph.structures import State, States, join_states
+from equimorph.tasks.motion.course import correct_onto_targets
+from equimorph.tasks.motion.tracking import Tracking
 from equimorph.tolerances import SAME_TO_ROUNDING
+
+
+@dataclass(frozen=True)
+class MovingTarget:
+    """Targets by the legs of a motion, as `track` followed them at nominal loads.
+
+    Parameters
+    ----------
+    descriptors
+        What has targets.
+    at
+        Legs that are done.
+    values
+        Targets there.
+    actuators
+        Places of the actuators.
+    """
+
+    descriptors: tuple[Descriptor, ...]
+    at: Values
+    values: Float[np.ndarray, "n m"]
+    actuators: Places
+
+    @classmethod
+    def of(cls, followed: Tracking, actuators: Places) -> "MovingTarget":
+        """The targets of a motion."""
+        values = np.stack([each(followed.states) for each in followed.targets], axis=1)
+        return cls(followed.targets, followed.path.at, values, actuators)
+
+    @property
+    def duration(self) -> float:
+        """Number of legs."""
+        return float(self.at[-1])
+
+    def place(self, state: State, at: float) -> Float[np.ndarray, " d"] | None:
+        """Actuators nearest to those of a state that meet the targets; None if none are found."""
+        wanted = np.array([np.interp(at, self.at, column) for column in self.values.T])
+        found = correct_onto_targets(
+            state.structure, state.z[None], state.p[None], self.actuators, self.descriptors,
+            wanted[None],
+        )  # fmt: skip
+        return found.p[0, self.actuators] if found.found[0] else None
+
 
 WayPoints = tuple[Mapping[str, float], ...]
 

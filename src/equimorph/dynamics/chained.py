@@ -7,8 +7,7 @@ import numpy as np
 from equimorph.array_types import Float
 from equimorph.dynamics.linkage import Linkage
 from equimorph.dynamics.mechanism import Mechanism, Vector
-from equimorph.dynamics.plant import LinkagePlant
-from equimorph.dynamics.simulation import Simulation
+from equimorph.dynamics.plant import LinkagePlant, Simulation
 from equimorph.structures import State, States, Structure
 
 

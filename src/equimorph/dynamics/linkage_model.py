@@ -10,7 +10,7 @@ from equimorph.dynamics.chained import Chained
 from equimorph.dynamics.fold_delay import fold_delay
 from equimorph.dynamics.mechanism import Pulls, Settings, Vector
 from equimorph.dynamics.model import Course, Model, Motion, Plant, Points, Row
-from equimorph.dynamics.simulation import Simulation
+from equimorph.dynamics.plant import Simulation
 from equimorph.structures import State, States
 
 ONE = np.ones(1)

@@ -11,8 +11,7 @@ from equimorph.argument_kinds import one_of
 from equimorph.argument_vocabulary import POSITIVE
 from equimorph.array_types import Float
 from equimorph.dynamics.model import Course, Model, Plant, landing
-from equimorph.dynamics.motion import TimedCorners, timed_corners
-from equimorph.dynamics.quasistatics import equilibria_along
+from equimorph.dynamics.motion import TimedCorners, equilibria_along, timed_corners
 from equimorph.dynamics.simulators import model_of
 from equimorph.model import Schedule
 from equimorph.structures import State, Structure

@@ -1,14 +1,14 @@
 """Which simulator covers which structure."""
 
 from equimorph.dynamics.cosserat import CosseratModel, elastica_module
+from equimorph.dynamics.direct import TrussModel
 from equimorph.dynamics.frames import ChainedFrame
 from equimorph.dynamics.linkage_model import LinkageModel
 from equimorph.dynamics.model import Model
 from equimorph.dynamics.own import OwnModel
+from equimorph.dynamics.plant import mujoco_module
 from equimorph.dynamics.rods import ChainedRod
-from equimorph.dynamics.simulation import mujoco_module
 from equimorph.dynamics.spatial_rods import ChainedSpatialRod, check_isolated
-from equimorph.dynamics.trusses import TrussModel
 from equimorph.errors import InputError
 from equimorph.structures import Frame, Rod, SpatialRod, State, Truss
 

@@ -11,8 +11,7 @@ from equimorph.manifold.complex.equilibrium_set import (
     Stratum,
 )
 from equimorph.manifold.geometry.points import VertexKind
-from equimorph.manifold.lookup.exact_states import lift_to
-from equimorph.manifold.lookup.states_over import StatesOver
+from equimorph.manifold.lookup.exact_states import StatesOver, lift_to
 from equimorph.manifold.queries.barriers import Barriers, SetBarriers, barriers
 from equimorph.manifold.queries.components import Components, components
 from equimorph.manifold.queries.cusps import Cusps, cusps

@@ -26,8 +26,11 @@ from equimorph.model.journal import (
     Journal,
     Progress,
     Silent,
+    Workers,
     content_of_descriptor,
     content_of_function,
+    cut_rows,
+    map_rows,
     recalled,
 )
 from equimorph.model.obstacle import Disc, HalfPlane, Obstacle
@@ -36,14 +39,13 @@ from equimorph.model.parameter import (
     Grid,
     Parameter,
     Role,
+    Spline,
     names_of,
     parameter_vector,
     position,
 )
 from equimorph.model.rebuilding import Call, Rebuilt, remake, remember_call
 from equimorph.model.schedule import Rates, Schedule
-from equimorph.model.spline import Spline
-from equimorph.model.workers import Workers, cut_rows, map_rows
 
 __all__ = [
     "NOT_KEPT",

@@ -22,8 +22,8 @@ from equimorph.model import ActuatorKind, Constraint, Drawing, Obstacle, Support
 from equimorph.plotting import style
 from equimorph.plotting.depth import Viewpoint, draw_triad, viewpoint_of
 from equimorph.plotting.labels import with_unit
+from equimorph.plotting.scene import Picture, draw_solids, moving_solid
 from equimorph.plotting.support_symbols import AWAY, HUB, SYMBOLS, UPRIGHT, Stroke
-from equimorph.plotting.tubes import Picture, draw_solids, moving_solid
 from equimorph.structures import States
 
 _RADIUS = 0.022

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import equimorph as em
+from equimorph.tasks.designing.bounds import RouteExtreme
 from equimorph.tasks.designing.family import DesignFamily
 from equimorph.tasks.designing.pieces import follow_piece
-from equimorph.tasks.designing.routes import RouteExtreme
 from families import STRIP, TRUSS, arch, strip, truss
 from typecheck import unchecked
 

@@ -5,7 +5,7 @@ import pytest
 
 import equimorph as em
 from equimorph.errors import InputError
-from equimorph.tasks.timing.filtered_motion import FilteredMotion
+from equimorph.tasks.timing.retiming import FilteredMotion
 
 CORNERS = ({"x_l": 1.3, "F": 0.0}, {"x_l": 1.3, "F": 0.2}, {"x_l": 1.5, "F": 0.2})
 RATES = {"x_l": 0.5, "F": 0.2}

@@ -16,9 +16,9 @@ from equimorph.manifold.complex.base_mesh import BaseMesh
 from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.setting import Setting
 from equimorph.manifold.geometry.topology import facets_of
+from equimorph.manifold.lookup.exact_states import StatesOver
 from equimorph.manifold.lookup.near_crossings import NearCrossings, of_set
 from equimorph.manifold.lookup.over import Sheets
-from equimorph.manifold.lookup.states_over import StatesOver
 from equimorph.model import Box, Constraint, parameter_vector, position
 from equimorph.structures import States, Structure
 from equimorph.tables import Table, Tabular, html_table, units_of

@@ -15,8 +15,7 @@ from equimorph.equilibria.gradient_flow import FAITHFUL, Ending
 from equimorph.equilibria.soft_modes import metric_length
 from equimorph.equilibria.ways import Nowhere
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
-from equimorph.manifold.lookup.exact_states import exact_states, lift_to
-from equimorph.manifold.lookup.states_over import StatesOver
+from equimorph.manifold.lookup.exact_states import StatesOver, exact_states, lift_to
 from equimorph.model import Progress
 from equimorph.structures import States, Structure
 from equimorph.tolerances import SAME_SOLUTION

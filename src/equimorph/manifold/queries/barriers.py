@@ -20,8 +20,7 @@ from equimorph.errors import InputError
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.manifold.geometry.points import on_fold
 from equimorph.manifold.lookup.cell_index import CellIndex
-from equimorph.manifold.lookup.exact_states import root_weights
-from equimorph.manifold.lookup.states_over import StatesOver
+from equimorph.manifold.lookup.exact_states import StatesOver, root_weights
 from equimorph.manifold.queries.barrier_landings import (
     CHUNK,
     NONE,

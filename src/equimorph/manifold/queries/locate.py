@@ -11,7 +11,7 @@ from equimorph.arrays import Flags, Lanes, Parameters
 from equimorph.errors import InputError
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.manifold.geometry.topology import faces_of
-from equimorph.manifold.lookup.states_over import StatesOver
+from equimorph.manifold.lookup.exact_states import StatesOver
 from equimorph.manifold.queries.least_squares import nearest
 from equimorph.manifold.queries.nearest import Ground, SetPoints, local_minima, points_at_vertices
 from equimorph.model import Descriptor, position

@@ -12,7 +12,7 @@ from equimorph.array_types import Int
 from equimorph.arrays import Flags, Lanes, Parameters, Values
 from equimorph.equilibria.soft_modes import metric_length
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
-from equimorph.manifold.lookup.states_over import StatesOver
+from equimorph.manifold.lookup.exact_states import StatesOver
 from equimorph.manifold.queries.barrier_landings import over_parameters
 from equimorph.manifold.queries.barriers import SetBarriers, nearest_states
 from equimorph.manifold.queries.levels import Level, level_set, part

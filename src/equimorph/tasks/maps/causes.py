@@ -15,10 +15,10 @@ from equimorph.array_types import Bool, Float, Int
 from equimorph.arrays import Edges, Flags, Settings, Values
 from equimorph.columns import Columns
 from equimorph.equilibria.critical import Critical, Test
+from equimorph.equilibria.critical_tests import TestsOf, correct_singular_states
 from equimorph.equilibria.first_stable import no_critical_states
 from equimorph.equilibria.natural_sheet import NaturalSheet
 from equimorph.equilibria.settle import free_directions
-from equimorph.equilibria.singular_states import TestsOf, correct_singular_states
 from equimorph.equilibria.trace_options import TraceOptions
 from equimorph.model import Constraint, Descriptor
 from equimorph.tasks.maps.brackets import PARTS, SHRINKING, Brackets, Samples, sample_distance
