@@ -135,13 +135,11 @@ from .dynamics import (
 from .tasks.words.strokes import (
     word_graph as word_graph,
 )
-from .tasks.words.over_set import (
-    word_graph_over as word_graph_over,
-)
 from .tasks.words.word_graph import (
     WordGraph as WordGraph,
-    WordRoute as WordRoute,
     WordMove as WordMove,
+    WordRoute as WordRoute,
+    word_graph_over as word_graph_over,
 )
 from .tasks.words.row import (
     Row as Row,
@@ -277,21 +275,19 @@ from .tasks.reach.reachable_sets import (
 
 # Design structures for control
 from .tasks.designing.design import (
-    design as design,
     Design as Design,
+    DesignFront as DesignFront,
+    design as design,
+    design_front as design_front,
 )
 from .tasks.designing.search import (
     DesignStep as DesignStep,
-)
-from .tasks.designing.front import (
-    design_front as design_front,
-    DesignFront as DesignFront,
 )
 from .tasks.designing.questions import (
     LoadLimit as LoadLimit,
     StateValue as StateValue,
 )
-from .tasks.designing.routes import (
+from .tasks.designing.bounds import (
     RouteExtreme as RouteExtreme,
 )
 from .tasks.designing.bounds import (
