@@ -139,7 +139,7 @@ def test_exact_points_give_the_exact_unknowns(tmp_path):
     problem = prepared(tmp_path, table="\n".join(rows))
     asked = problem.questions[0]
     with unchecked():
-        found = asked.answer(None, Silent())
+        found = asked.answer(Silent())
     assert found.names == ("EI", "offset of P")
     np.testing.assert_allclose(found.values, [0.023, 0.01], rtol=1e-7)
 
@@ -150,7 +150,7 @@ def test_loads_that_the_natural_state_does_not_carry_are_refused(tmp_path):
     problem = prepared(tmp_path, study, TABLE.replace("0.2,1.0", "0.3,1.0"))
     asked = problem.questions[0]
     with unchecked(), pytest.raises(InputError, match=r"natural state carries; got state 2.*0\.19"):
-        asked.answer(None, Silent())
+        asked.answer(Silent())
 
 
 @pytest.mark.parametrize(

@@ -17,7 +17,7 @@ REST = float(np.arccos(0.8))
 
 
 def _choose(eset: EquilibriumSet, section: StateSection, key: str) -> State:
-    return choose_state(Ground(eset.structure, None), eset, section, key)
+    return choose_state(Ground(eset.structure, None, eset), section, key)
 
 
 @pytest.fixture

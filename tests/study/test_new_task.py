@@ -97,9 +97,9 @@ def test_names_are_looked_up_and_the_task_is_called(finished: tuple[Outcome, Pat
     outcome = finished[0]
     question = asked(outcome.problem)
     assert question["descriptor"] == outcome.problem.structure.descriptor("angle")
-    found = question.answer(outcome.equilibrium_set, Silent())
+    found = question.answer(Silent())
     assert found.above == pytest.approx(0.6435011088 - 0.5, abs=1e-9)
-    title, words = question.kind.report(question, outcome.equilibrium_set, found, Path())
+    title, words = question.kind.report(question, found, Path())
     assert title == "<h2>Height here</h2>"
     assert words == '<p class="verdict"><strong>Above</strong> by 0.143501</p>'
     assert question.kind.line(question, found) == "Height here: [bold green]above[/] by 0.143501"

@@ -17,10 +17,9 @@ from equimorph.tasks.route import Route
 from equimorph.tasks.verification.schedule_check import Verification
 
 
-def figures_of_states(
-    question: Question, eset: EquilibriumSet | None, states: States
-) -> list[Figure]:
+def figures_of_states(question: Question, states: States) -> list[Figure]:
     """Where the states lie on the plane of two free parameters."""
+    eset = question.eset
     if eset is None or len(eset.names) != 2 or not len(states):
         return []
     draw = partial(plotting.solutions, eset, states)

@@ -17,6 +17,7 @@ from equimorph.errors import InputError
 from equimorph.model import Box, names_of
 from equimorph.study.lookup import (
     Ground,
+    Later,
     RuleSection,
     at_key,
     check_parameters,
@@ -28,12 +29,12 @@ from equimorph.study.lookup import (
     rule_of,
 )
 from equimorph.study.states import (
-    ChosenState,
     NaturalSection,
-    NaturalState,
     StateSection,
     check_natural,
     check_state,
+    choose_state,
+    lift_state,
 )
 
 REQUIRED = inspect.Parameter.empty
@@ -111,7 +112,7 @@ class StateArgument(Argument):
     def interpret(self, ground: Ground, value: StateSection, key: str) -> Any:
         """Look up what it is chosen by."""
         check_state(ground, value, key)
-        return ChosenState(value, key)
+        return Later(lambda found: choose_state(found, value, key))
 
 
 class NaturalArgument(Argument):
@@ -120,7 +121,7 @@ class NaturalArgument(Argument):
     def interpret(self, ground: Ground, value: NaturalSection, key: str) -> Any:
         """Look up where it comes from."""
         check_natural(ground, value, key)
-        return NaturalState(value, key)
+        return Later(lambda found: lift_state(found, value, key))
 
 
 class DescriptorArgument(Argument):

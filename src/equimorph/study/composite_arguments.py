@@ -7,7 +7,6 @@ from typing import Annotated, Any
 from pydantic import AfterValidator, Field, WithJsonSchema
 
 from equimorph.errors import InputError
-from equimorph.manifold import EquilibriumSet
 from equimorph.model import Grid, Rates, Schedule, position
 from equimorph.structures import State, Structure
 from equimorph.study.arguments import Argument, StateArgument
@@ -37,17 +36,14 @@ EXTREME = re.compile(r"(?P<which>peak|least)\((?P<descriptor>.+)\)")
 """A descriptor whose largest value is kept low, or least value high."""
 
 
-@dataclass(frozen=True)
-class _FirstState(Later):
+def _first_state(schedule: Schedule, key: str) -> Later:
     """State in which a schedule from a file begins."""
 
-    schedule: Schedule
-    key: str
+    def find(ground: Ground) -> State:
+        with at_key(key):
+            return first_state(schedule, ground.structure)
 
-    def on(self, ground: Ground, eset: EquilibriumSet | None) -> State:
-        del eset
-        with at_key(self.key):
-            return first_state(self.schedule, ground.structure)
+    return Later(find)
 
 
 class WayStartArgument(StateArgument):
@@ -64,7 +60,7 @@ class WayStartArgument(StateArgument):
     def look_up(self, ground: Ground, section: Any, place: str) -> Any:
         """Look up what it is chosen by; a schedule brings its first state along."""
         if section.schedule is not None:
-            return _FirstState(section.schedule.schedule, f"{place}.schedule")
+            return _first_state(section.schedule.schedule, f"{place}.schedule")
         return super().look_up(ground, section, place)
 
 

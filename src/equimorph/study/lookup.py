@@ -1,7 +1,6 @@
 """Parameters, descriptors, points and rules of a study, looked up; the key of what fails."""
 
-from abc import ABC, abstractmethod
-from collections.abc import Generator, Iterable, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -76,12 +75,11 @@ class Ground:
         return self.field.descriptor.function(z, p)
 
 
-class Later(ABC):
+@dataclass(frozen=True)
+class Later:
     """What becomes an argument of a task only when the set is there."""
 
-    @abstractmethod
-    def on(self, ground: Ground, eset: EquilibriumSet | None) -> Any:
-        """Return the argument."""
+    on: Callable[[Ground], Any]
 
 
 @contextmanager

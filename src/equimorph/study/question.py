@@ -188,27 +188,30 @@ class Question:
         """Free parameters of the set."""
         return self.ground.box.names
 
-    def answer(
-        self, eset: EquilibriumSet | None, sink: Progress, workers: Workers | None = None
-    ) -> Any:
+    @property
+    def eset(self) -> EquilibriumSet | None:
+        """Set of the study, as soon as it is there."""
+        return self.ground.eset
+
+    def answer(self, sink: Progress, workers: Workers | None = None) -> Any:
         """Compute the answer; `InputError` names the key."""
-        arguments = self._arguments(eset, sink)
+        arguments = self._arguments(sink)
         arguments["workers"] = workers
         with at_key(self.key):
             return self.kind.answer(self, arguments)
 
-    def _arguments(self, eset: EquilibriumSet | None, sink: Progress) -> "Arguments":
+    def _arguments(self, sink: Progress) -> "Arguments":
         """All arguments, with states and constraints of the set."""
         values = {
-            name: each.on(self.ground, eset) if isinstance(each, Later) else each
+            name: each.on(self.ground) if isinstance(each, Later) else each
             for name, each in self.values.items()
         }
         if self.kind.within_set and not isinstance(values.get("schedule"), Schedule):
-            bounds = () if eset is None else eset.constraints
+            bounds = () if self.eset is None else self.eset.constraints
             values["within"] = tuple(dict.fromkeys((*bounds, *self.within)))
         monitor: list[Descriptor] = [self.ground.height]
         given = {
-            "eset": eset, "structure": self.structure, "progress": sink, "monitor": monitor,
+            "eset": self.eset, "structure": self.structure, "progress": sink, "monitor": monitor,
         }  # fmt: skip
         return Arguments(given | values)
 
@@ -316,9 +319,7 @@ class Kind(ABC, Generic[A]):
         answer: A = task(**arguments.of(task))
         return answer
 
-    def figures(
-        self, question: Question, eset: EquilibriumSet | None, answer: A
-    ) -> Sequence[Figure]:
+    def figures(self, question: Question, answer: A) -> Sequence[Figure]:
         """Figures of the answer."""
         return ()
 
@@ -353,16 +354,14 @@ class Kind(ABC, Generic[A]):
         for name, schedule in self.schedules(question, answer).items():
             write_schedule(schedule, folder / schedule_table(name))
 
-    def report(
-        self, question: Question, eset: EquilibriumSet | None, answer: A, folder: Path
-    ) -> list[str]:
+    def report(self, question: Question, answer: A, folder: Path) -> list[str]:
         """Pieces of the page; the figures are in the folder."""
         why = self.refusal(question, answer)
         return [
             f"<h2>{escape(question.title)}</h2>",
             html.refusal_line(why) if why else html.found_line(self.words(question, answer)),
             *map(html.schedule_links, map(schedule_table, self.schedules(question, answer))),
-            *pictures(folder, self.figures(question, eset, answer)),
+            *pictures(folder, self.figures(question, answer)),
             *self.details(question, answer),
             *html.table_links({x.file: x.content for x in self.tables(question, answer)}),
         ]

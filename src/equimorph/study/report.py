@@ -67,7 +67,7 @@ def _figures(outcome: Outcome) -> list[Figure]:
     eset = outcome.equilibrium_set
     figures = [] if eset is None else [*_explorer(outcome, eset), *_figures_of_set(outcome, eset)]
     for each in outcome.answers:
-        figures += each.question.kind.figures(each.question, eset, each.answer)
+        figures += each.question.kind.figures(each.question, each.answer)
     return figures
 
 
@@ -141,9 +141,7 @@ def report(outcome: Outcome, folder: Path, text: str, title: str) -> str:
     if (folder / EXPLORER).exists():
         body.append(html.embedded(EXPLORER, ON_THE_SET))
     for each in outcome.answers:
-        body += each.question.kind.report(
-            each.question, outcome.equilibrium_set, each.answer, folder
-        )
+        body += each.question.kind.report(each.question, each.answer, folder)
     for point, states in zip(outcome.problem.points, outcome.points, strict=True):
         body += _equilibria(point, states, _shown_descriptors(outcome.problem))
     if outcome.equilibrium_set is not None:

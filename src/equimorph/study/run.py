@@ -254,7 +254,7 @@ def solve(
     for done, question in enumerate(problem.questions):
         progress.report("questions", done, count)
         with _measure_time(seconds, f"{question.kind.table} {question.name}"):
-            compute = partial(question.answer, eset, progress, workers)
+            compute = partial(question.answer, progress, workers)
             answers.append(_answer(study, question, checkpoints, compute))
     progress.report("questions", count, count)
     checkpoints.forget_others()

@@ -1,6 +1,5 @@
 """States of a study: chosen on the set, or lifted from a natural state."""
 
-from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
@@ -9,11 +8,10 @@ from pydantic import AfterValidator, Field, model_validator
 from equimorph.arrays import Values
 from equimorph.equilibria import lift
 from equimorph.errors import InputError
-from equimorph.manifold import EquilibriumSet
 from equimorph.model import names_of, parameter_vector
-from equimorph.structures import State, States, Structure
+from equimorph.structures import State, States
 from equimorph.study.fields import Point, Section, Step, one, requirement
-from equimorph.study.lookup import Ground, Later, at_key, check_point, check_values, descriptor_at
+from equimorph.study.lookup import Ground, at_key, check_point, check_values, descriptor_at
 
 AGREEMENT = 1e-3
 """A descriptor given with `near` agrees when it is this close: values are copied from a report."""
@@ -41,40 +39,6 @@ class NaturalSection(Section):
     steps: list[Step] = Field(default_factory=list)
 
 
-@dataclass(frozen=True)
-class ChosenState(Later):
-    """A state to be chosen when the set is there.
-
-    Parameters
-    ----------
-    section
-        Point, and how to choose among the stable equilibria over it.
-    key
-        Key of the study file, for messages.
-    """
-
-    section: StateSection
-    key: str
-
-    def on(self, ground: Ground, eset: EquilibriumSet | None) -> State:
-        """State on the set of the study."""
-        assert eset is not None
-        return choose_state(ground, eset, self.section, self.key)
-
-
-@dataclass(frozen=True)
-class NaturalState(Later):
-    """A state to be lifted from a natural one, with the key of the study file."""
-
-    section: NaturalSection
-    key: str
-
-    def on(self, ground: Ground, eset: EquilibriumSet | None) -> State:
-        """Natural state, lifted along the steps."""
-        del eset
-        return _lifted_state(ground.structure, self.section, self.key)
-
-
 def check_state(ground: Ground, section: StateSection, key: str) -> None:
     """Refuse a point outside the box, and descriptors to choose by that do not exist."""
     check_point(ground.box, section.at, f"{key}.at")
@@ -99,15 +63,13 @@ def check_natural(ground: Ground, given: NaturalSection, key: str) -> None:
         parameter_vector(structure.parameters, {**given.at, **structure.unloaded()})
 
 
-def choose_state(ground: Ground, eset: EquilibriumSet, section: StateSection, key: str) -> State:
+def choose_state(ground: Ground, section: StateSection, key: str) -> State:
     """Return the stable equilibrium that a section of a study describes.
 
     Parameters
     ----------
     ground
-        What the descriptors mean by which it is chosen.
-    eset
-        The equilibrium set.
+        The equilibrium set, and what the descriptors mean by which it is chosen.
     section
         Point, and how to choose among the stable equilibria over it.
     key
@@ -118,7 +80,8 @@ def choose_state(ground: Ground, eset: EquilibriumSet, section: StateSection, ke
     InputError
         If no state is stable there, the choice is ambiguous, or `near` meets no equilibrium.
     """
-    here = eset.at(**section.at)
+    assert ground.eset is not None
+    here = ground.eset.at(**section.at)
     stable = here.stable
     if not len(stable):
         raise InputError(
@@ -164,8 +127,9 @@ def _point(point: dict[str, float]) -> str:
     return ", ".join(f"{name} = {value:g}" for name, value in point.items())
 
 
-def _lifted_state(structure: Structure, given: NaturalSection, key: str) -> State:
+def lift_state(ground: Ground, given: NaturalSection, key: str) -> State:
     """Return the natural state of a section, lifted along its steps."""
+    structure = ground.structure
     values = {**given.at, **structure.unloaded()}
     p = parameter_vector(structure.parameters, values)
     z, found = structure.natural(p[None])

@@ -11,7 +11,7 @@ from pydantic import Field
 
 from equimorph import plotting
 from equimorph.charts import Atlas, Chart, DescriptorChart, Projection, Reduction, dissect, reduce
-from equimorph.manifold import EquilibriumSet, part
+from equimorph.manifold import part
 from equimorph.study import html
 from equimorph.study.answers import count_of
 from equimorph.study.fields import requirement
@@ -65,9 +65,7 @@ class ChartKind(Kind[Chart | Atlas]):
         chart: Chart | Atlas = make(**arguments.of(make))
         return chart
 
-    def figures(
-        self, question: Question, eset: EquilibriumSet | None, answer: Chart | Atlas
-    ) -> list[Figure]:
+    def figures(self, question: Question, answer: Chart | Atlas) -> list[Figure]:
         """Return the part of the set that is covered above, the domains of the charts below."""
         caption = "Above, the part of the set that is covered; below, the domain of each chart."
         return _draw(question, answer, answer.coordinates.names, caption)
@@ -101,9 +99,7 @@ class ReductionKind(Kind[Reduction]):
     table = "reduction"
     tasks = (reduce,)
 
-    def figures(
-        self, question: Question, eset: EquilibriumSet | None, answer: Reduction
-    ) -> list[Figure]:
+    def figures(self, question: Question, answer: Reduction) -> list[Figure]:
         """Return the preferred part of the set above, its domain with barriers and gaps below."""
         caption = "Above, the preferred part of the set; below, its domain with barriers and gaps."
         return _draw(question, answer, answer.names, caption)

@@ -10,7 +10,6 @@ from pydantic import Field
 
 from equimorph import plotting
 from equimorph.errors import InputError
-from equimorph.manifold import EquilibriumSet
 from equimorph.model import Descriptor
 from equimorph.study import html
 from equimorph.study.answers import place_of
@@ -81,9 +80,7 @@ class MapKind(Kind[ActuatorMap]):
             DataTable(f"{files}-curves.csv", "curves", answer.curve_table),
         ]
 
-    def figures(
-        self, question: Question, eset: EquilibriumSet | None, answer: ActuatorMap
-    ) -> list[Figure]:
+    def figures(self, question: Question, answer: ActuatorMap) -> list[Figure]:
         """Return the map with its curves."""
         if isinstance(answer, CurvatureMap):
             caption = "The first stable state on each path; dots: a real loading snaps on the way."
@@ -155,9 +152,7 @@ class StrongestKind(Kind[Answer]):
         lmap, offsets = limit_load_map(**arguments.of(limit_load_map)), question["offsets"]
         return lmap, strongest(lmap), strongest(lmap, offsets=offsets) if offsets else None
 
-    def figures(
-        self, question: Question, eset: EquilibriumSet | None, answer: Answer
-    ) -> list[Figure]:
+    def figures(self, question: Question, answer: Answer) -> list[Figure]:
         """The settings on the map, and limit loads near the best one."""
         amap, sure, robust = answer
         if sure.status == "refused":

@@ -14,7 +14,6 @@ from pydantic import Field
 from equimorph import plotting
 from equimorph.equilibria import lift
 from equimorph.errors import InputError
-from equimorph.manifold import EquilibriumSet
 from equimorph.model import parameter_vector
 from equimorph.structures import States, Structure, from_identity
 from equimorph.study import html
@@ -44,11 +43,9 @@ class ShapeKind(Kind[Shapes]):
     table = "shape"
     tasks = (solve_shape,)
 
-    def figures(
-        self, question: Question, eset: EquilibriumSet | None, answer: Shapes
-    ) -> list[Figure]:
+    def figures(self, question: Question, answer: Shapes) -> list[Figure]:
         """Where they lie."""
-        return figures_of_states(question, eset, answer.states)
+        return figures_of_states(question, answer.states)
 
     def words(self, question: Question, answer: Shapes) -> str:
         """How many there are."""
@@ -92,11 +89,9 @@ class EstimateKind(Kind[StateEstimate]):
                 f"({', '.join(section.measured)}); got {', '.join(section.errors)}."
             )
 
-    def figures(
-        self, question: Question, eset: EquilibriumSet | None, answer: StateEstimate
-    ) -> list[Figure]:
+    def figures(self, question: Question, answer: StateEstimate) -> list[Figure]:
         """Where the candidates lie."""
-        return figures_of_states(question, eset, answer.states)
+        return figures_of_states(question, answer.states)
 
     def words(self, question: Question, answer: StateEstimate) -> str:
         """Name the best candidate."""
@@ -200,9 +195,7 @@ class CalibrationKind(Kind[Calibration]):
             DataTable(f"{files}-points.csv", "measured and fitted", Table(compared, units)),
         ]
 
-    def figures(
-        self, question: Question, eset: EquilibriumSet | None, answer: Calibration
-    ) -> list[Figure]:
+    def figures(self, question: Question, answer: Calibration) -> list[Figure]:
         """Measured points over the fitted shapes, and the residuals."""
         draw = partial(plotting.calibration, answer, question.extra.measured.shape)
         caption = "Measured points over the fitted shapes; below, fitted less measured coordinates."

@@ -11,7 +11,6 @@ from pydantic import Field
 
 from equimorph import plotting
 from equimorph.dynamics import Replay, replay
-from equimorph.manifold import EquilibriumSet
 from equimorph.model import Schedule, names_of
 from equimorph.storage import write_trajectory
 from equimorph.storage.trajectory import trajectory_message
@@ -65,12 +64,10 @@ class MotionKind(Kind[Verification]):
         with at_key(question.key):
             trajectory_message(resting, question.section.joints, seconds=question.section.seconds)
 
-    def figures(
-        self, question: Question, eset: EquilibriumSet | None, answer: Verification
-    ) -> list[Figure]:
+    def figures(self, question: Question, answer: Verification) -> list[Figure]:
         """As for a route."""
         route = as_route(answer, "arrived" if answer.verified else "refused")
-        return figures_of_way(eset, question.files, route, "motion", question.within)
+        return figures_of_way(question.eset, question.files, route, "motion", question.within)
 
     def words(self, question: Question, answer: Verification) -> str:
         """Say how long it takes, and how near to instability it leads."""
@@ -103,11 +100,8 @@ class ReplayKind(Kind[Replay]):
     tasks = (replay,)
     left_out = ("structure",)
 
-    def figures(
-        self, question: Question, eset: EquilibriumSet | None, answer: Replay
-    ) -> list[Figure]:
+    def figures(self, question: Question, answer: Replay) -> list[Figure]:
         """Deviation over time, and a film beside the statics."""
-        del eset
         deviation = still(
             f"{question.files}-deviation", partial(plotting.deviation_over_time, answer),
             "Largest distance of a point from its equilibrium, over time.",
@@ -156,12 +150,10 @@ class TrackKind(Kind[Tracking]):
     tasks = (track,)
     within_set = True
 
-    def figures(
-        self, question: Question, eset: EquilibriumSet | None, answer: Tracking
-    ) -> list[Figure]:
+    def figures(self, question: Question, answer: Tracking) -> list[Figure]:
         """As for a route."""
         route = as_route(answer, answer.status)
-        return figures_of_way(eset, question.files, route, "motion", question.within)
+        return figures_of_way(question.eset, question.files, route, "motion", question.within)
 
     def words(self, question: Question, answer: Tracking) -> str:
         """Say how near to instability it leads, and whether the actuators come back."""

@@ -8,7 +8,6 @@ from types import MappingProxyType
 import numpy as np
 
 from equimorph import plotting
-from equimorph.manifold import EquilibriumSet
 from equimorph.model import Schedule
 from equimorph.structures import States, join_states
 from equimorph.study import html
@@ -36,11 +35,9 @@ class OptimumKind(Kind[Optima]):
         """Return that which leads to the best one."""
         return super().schedules(question, answer) if answer.found else {}
 
-    def figures(
-        self, question: Question, eset: EquilibriumSet | None, answer: Optima
-    ) -> list[Figure]:
+    def figures(self, question: Question, answer: Optima) -> list[Figure]:
         """Where they lie."""
-        return figures_of_states(question, eset, answer.states) if answer.found else []
+        return figures_of_states(question, answer.states) if answer.found else []
 
     def words(self, question: Question, answer: Optima) -> str:
         """Name the best one."""
@@ -67,11 +64,9 @@ class RobustOptimumKind(Kind[RobustOptimum]):
     table = "robust_optimum"
     tasks = (robust_optimum,)
 
-    def figures(
-        self, question: Question, eset: EquilibriumSet | None, answer: RobustOptimum
-    ) -> list[Figure]:
+    def figures(self, question: Question, answer: RobustOptimum) -> list[Figure]:
         """Where the nominal and the robust optimum lie."""
-        return figures_of_states(question, eset, _both_optima(answer)) if answer.found else []
+        return figures_of_states(question, _both_optima(answer)) if answer.found else []
 
     def words(self, question: Question, answer: RobustOptimum) -> str:
         """What is guaranteed, and its price."""
@@ -135,9 +130,7 @@ class FollowKind(Kind[FollowedOptimum]):
     names = MappingProxyType({"to": "targets"})
     within_set = True
 
-    def figures(
-        self, question: Question, eset: EquilibriumSet | None, answer: FollowedOptimum
-    ) -> list[Figure]:
+    def figures(self, question: Question, answer: FollowedOptimum) -> list[Figure]:
         """Objective and actuators along the legs."""
         if not len(answer.states):
             return []
@@ -246,9 +239,7 @@ class LandscapeKind(Kind[Landscape]):
             DataTable(f"{files}-barriers.csv", "barriers", Table(edges, units)),
         ]
 
-    def figures(
-        self, question: Question, eset: EquilibriumSet | None, answer: Landscape
-    ) -> list[Figure]:
+    def figures(self, question: Question, answer: Landscape) -> list[Figure]:
         """Return the map with barriers and gaps."""
         objective = question["objective"]
         draw = partial(plotting.landscape, question.structure, answer, objective)

@@ -11,7 +11,6 @@ import numpy as np
 from pydantic import Field
 
 from equimorph import plotting
-from equimorph.manifold import EquilibriumSet
 from equimorph.study import html
 from equimorph.study.fields import Number, requirement
 from equimorph.study.question import Arguments, DataTable, Figure, Kind, Question, still
@@ -82,9 +81,7 @@ class ReachKind(Kind[Reached]):
         table = Table(columns, units_of((*question.structure.parameters, *shown)))
         return [DataTable(f"{question.files}.csv", "all states of the boundary", table)]
 
-    def figures(
-        self, question: Question, eset: EquilibriumSet | None, answer: Reached
-    ) -> list[Figure]:
+    def figures(self, question: Question, answer: Reached) -> list[Figure]:
         """Image and region, of two descriptors over two parameters."""
         reach, files = answer[0], question.files
         if len(reach.descriptors) != 2 or len(reach.whole.names) != 2:

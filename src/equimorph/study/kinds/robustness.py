@@ -11,7 +11,6 @@ from pydantic import Field
 
 from equimorph import plotting
 from equimorph.errors import InputError
-from equimorph.manifold import EquilibriumSet
 from equimorph.plotting.robustness import MOST_BARS
 from equimorph.structures import State
 from equimorph.study import html
@@ -31,9 +30,7 @@ class SensitivityKind(Kind[Sensitivity]):
     names = MappingProxyType({"names": "parameters"})
     own = MappingProxyType({"descriptors": (Annotated[list[str], Field(min_length=1)], ...)})
 
-    def figures(
-        self, question: Question, eset: EquilibriumSet | None, answer: Sensitivity
-    ) -> list[Figure]:
+    def figures(self, question: Question, answer: Sensitivity) -> list[Figure]:
         """Bars, where they are few enough to be read."""
         draw = partial(plotting.sensitivities, question.structure, answer)
         caption = "Changes of the descriptors for one scale of each parameter."
@@ -89,9 +86,7 @@ class ImperfectionKind(Kind[Mapping[str, ImperfectionLaw]]):
             for name in question.section.imperfections
         }
 
-    def figures(
-        self, question: Question, eset: EquilibriumSet | None, answer: Mapping[str, ImperfectionLaw]
-    ) -> list[Figure]:
+    def figures(self, question: Question, answer: Mapping[str, ImperfectionLaw]) -> list[Figure]:
         """Return the powers on logarithmic axes, if any was found."""
         known = {name: law for name, law in answer.items() if law.status == "fitted"}
         draw = partial(plotting.imperfection_laws, question.structure, known, question.section.load)
@@ -146,11 +141,9 @@ class RoomKind(Kind[tuple[State, Room]]):
         """Lift rays from the state."""
         return arguments["states"], stable_room(**arguments.of(stable_room))
 
-    def figures(
-        self, question: Question, eset: EquilibriumSet | None, answer: tuple[State, Room]
-    ) -> list[Figure]:
+    def figures(self, question: Question, answer: tuple[State, Room]) -> list[Figure]:
         """Where it lies, over two parameters."""
-        draw = partial(plotting.room, *answer, eset)
+        draw = partial(plotting.room, *answer, question.eset)
         caption = "The room around the state (●) and where it ends (×)."
         two = len(question.section.tolerances) == 2
         return [still(question.files, draw, caption)] if two else []
@@ -180,9 +173,7 @@ class TrialsKind(Kind[Trials]):
     tasks = (random_trials,)
     within_set = True
 
-    def figures(
-        self, question: Question, eset: EquilibriumSet | None, answer: Trials
-    ) -> list[Figure]:
+    def figures(self, question: Question, answer: Trials) -> list[Figure]:
         """Return the trials by their offsets."""
         draw = partial(plotting.trials, question.structure, answer)
         return [still(question.files, draw, "Each trial by the errors of the parameters.")]

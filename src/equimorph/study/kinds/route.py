@@ -12,7 +12,6 @@ from pydantic import AfterValidator
 
 from equimorph import plotting
 from equimorph.errors import InputError
-from equimorph.manifold import EquilibriumSet
 from equimorph.model import Schedule
 from equimorph.storage import write_certificate
 from equimorph.study import html
@@ -110,17 +109,15 @@ class RouteKind(Kind[Routes]):
         named = _name_routes(question, answer)
         return {name: route.schedule for name, route in named if route.schedule is not None}
 
-    def figures(
-        self, question: Question, eset: EquilibriumSet | None, answer: Routes
-    ) -> list[Figure]:
+    def figures(self, question: Question, answer: Routes) -> list[Figure]:
         """Shapes, margins, plane and film of the best; all of them on one plane."""
         best = answer[0].bottleneck
         bounds = [*question.within]
         if best is not None:
             bounds.append(question["objective"].bound(best.value, 0.0))
-        found = figures_of_way(eset, question.name, answer[0], "route", bounds)
-        if len(answer) > 1 and eset is not None:
-            draw = partial(plotting.alternative_routes, eset, answer)
+        found = figures_of_way(question.eset, question.name, answer[0], "route", bounds)
+        if len(answer) > 1 and question.eset is not None:
+            draw = partial(plotting.alternative_routes, question.eset, answer)
             caption = "Routes that cannot be drawn into each other; the first is the best."
             found.insert(0, still(f"{question.name}-alternatives", draw, caption))
         return found
@@ -211,9 +208,7 @@ class SampledRouteKind(Kind[Route]):
                     f"`{question.key}.loads[{i}]` must not move actuators; got {both[0]}."
                 )
 
-    def figures(
-        self, question: Question, eset: EquilibriumSet | None, answer: Route
-    ) -> list[Figure]:
+    def figures(self, question: Question, answer: Route) -> list[Figure]:
         """Parameters, shapes and margins."""
         return figures_of_way(None, question.files, answer, "route", question.within)
 
@@ -242,13 +237,11 @@ class VerifyKind(Kind[Verification]):
     left_out = ("options", "structure")
     within_set = True
 
-    def figures(
-        self, question: Question, eset: EquilibriumSet | None, answer: Verification
-    ) -> list[Figure]:
+    def figures(self, question: Question, answer: Verification) -> list[Figure]:
         """As for a route."""
         status: Literal["arrived", "refused"] = "arrived" if answer.verified else "refused"
         return figures_of_way(
-            eset, question.files, as_route(answer, status), "way", question.within
+            question.eset, question.files, as_route(answer, status), "way", question.within
         )
 
     def words(self, question: Question, answer: Verification) -> str:

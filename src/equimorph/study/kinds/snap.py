@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field
 
 from equimorph import plotting
-from equimorph.manifold import EquilibriumSet, Snap, SnapGraph, snap_graph
+from equimorph.manifold import Snap, SnapGraph, snap_graph
 from equimorph.model import Descriptor, names_of
 from equimorph.structures import State, States, join_states
 from equimorph.study import html
@@ -39,11 +39,9 @@ class SnapKind(Kind[tuple[State, LeastSnap]]):
         """Find the least change."""
         return arguments["state"], least_snap(**arguments.of(least_snap))
 
-    def figures(
-        self, question: Question, eset: EquilibriumSet | None, answer: tuple[State, LeastSnap]
-    ) -> list[Figure]:
+    def figures(self, question: Question, answer: tuple[State, LeastSnap]) -> list[Figure]:
         """State, fold and landing on the plane."""
-        return figures_of_states(question, eset, _stations(answer))
+        return figures_of_states(question, _stations(answer))
 
     def words(self, question: Question, answer: tuple[State, LeastSnap]) -> str:
         """Change and landing."""
@@ -126,13 +124,11 @@ class SnapGraphKind(Kind[Snaps]):
         told = DataTable(f"{question.files}.csv", "every snap that was followed", table)
         return [told] if answer[1] else []
 
-    def figures(
-        self, question: Question, eset: EquilibriumSet | None, answer: Snaps
-    ) -> list[Figure]:
+    def figures(self, question: Question, answer: Snaps) -> list[Figure]:
         """Two panels, over two parameters."""
-        if eset is None or len(eset.names) != 2 or not answer[1]:
+        if question.eset is None or len(question.eset.names) != 2 or not answer[1]:
             return []
-        draw = partial(plotting.snap_panels, SnapGraph(eset, *answer[:2]), question.extra)
+        draw = partial(plotting.snap_panels, SnapGraph(question.eset, *answer[:2]), question.extra)
         return [still(question.files, draw, CAPTION, wide=True)]
 
     def words(self, question: Question, answer: Snaps) -> str:

@@ -10,7 +10,7 @@ from equimorph import plotting
 from equimorph.array_types import Float
 from equimorph.dynamics.shock import LeastShock, least_shock
 from equimorph.equilibria import EnergyBarrier, EnergyPath, TransitionNetwork, transition_network
-from equimorph.manifold import EquilibriumSet, barriers
+from equimorph.manifold import barriers
 from equimorph.structures import State
 from equimorph.study import html
 from equimorph.study.answers import count_of, place_of, table_of_states
@@ -29,11 +29,8 @@ class TransitionNetworkKind(Kind[TransitionNetwork]):
     table = "transition_network"
     tasks = (transition_network,)
 
-    def figures(
-        self, question: Question, eset: EquilibriumSet | None, answer: TransitionNetwork
-    ) -> list[Figure]:
+    def figures(self, question: Question, answer: TransitionNetwork) -> list[Figure]:
         """The disconnectivity graph, and the way over the lowest pass, as a film, too."""
-        del eset
         if not len(answer.minima):
             return []
         tree = partial(plotting.disconnectivity, answer)
@@ -98,13 +95,11 @@ class BarriersKind(Kind[Field]):
         columns = {name: np.array([value]) for name, value in row.items()}
         return [DataTable(f"{question.files}.csv", "the largest barrier", Table(columns, units))]
 
-    def figures(
-        self, question: Question, eset: EquilibriumSet | None, answer: Field
-    ) -> list[Figure]:
+    def figures(self, question: Question, answer: Field) -> list[Figure]:
         """Over two parameters, the least barrier of each point."""
-        if eset is None or len(eset.names) != 2:
+        if question.eset is None or len(question.eset.names) != 2:
             return []
-        draw = partial(plotting.least_barriers, eset, answer[0])
+        draw = partial(plotting.least_barriers, question.eset, answer[0])
         caption = "The least barrier among the stable states at each setting."
         return [still(question.files, draw, caption)]
 

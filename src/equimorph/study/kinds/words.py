@@ -3,7 +3,6 @@
 from functools import partial
 
 from equimorph import plotting
-from equimorph.manifold import EquilibriumSet
 from equimorph.study import html
 from equimorph.study.answers import count_of
 from equimorph.study.question import Figure, Kind, Question, still
@@ -17,11 +16,8 @@ class WordsKind(Kind[WordGraph]):
     table = "words"
     tasks = (word_graph,)
 
-    def figures(
-        self, question: Question, eset: EquilibriumSet | None, answer: WordGraph
-    ) -> list[Figure]:
+    def figures(self, question: Question, answer: WordGraph) -> list[Figure]:
         """Words with the snaps between them."""
-        del eset
         caption = (
             "Words of stable states at rest, by the number of letters 1; arrows are strokes, each "
             "from one state at rest to the next, with its snaps."
