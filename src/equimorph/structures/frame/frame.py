@@ -1,25 +1,19 @@
 """The frame: rods between rigid or hinged joints; its loads, actuators, descriptors, symmetries."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
-from functools import cached_property
 from typing import Annotated, ClassVar
 
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
 from equimorph.argument_vocabulary import count
-from equimorph.array_types import Bool, Float, Int
 from equimorph.arrays import Lanes, Parameters, Values
 from equimorph.errors import InputError
-from equimorph.linalg.dense import multiply
 from equimorph.model import Descriptor, remember_call
-from equimorph.structures.any_network import edges_of_image, images, is_symmetry, parameter_exchange
 from equimorph.structures.contract import Readers, Symmetry, Written
 from equimorph.structures.frame.any_model import Actuators, Loads
 from equimorph.structures.frame.fields import FrameFields
 from equimorph.structures.frame.images import PlanarImage, find_images
-from equimorph.structures.frame.mechanics import FrameMechanics
 from equimorph.structures.frame.model import FrameModel
 from equimorph.structures.frame.network import AXES, MemberSpec, SupportSpec, frame_network
 from equimorph.structures.network import Joints

@@ -62,7 +62,11 @@ class FrameImage:
         found = np.full(self.node_count, NOWHERE)
         for row, at, back in zip(rows, self.there, self.reversed, strict=True):
             found[row] = rows[at][::-1] if back else rows[at]
-        return found
+        return self.complete(found)
+
+    def complete(self, nodes: Int[np.ndarray, " nodes"]) -> Int[np.ndarray, " nodes"]:
+        """The same with nodes to which no piece leads."""
+        return nodes
 
     @property
     @abstractmethod
@@ -84,7 +88,10 @@ class FrameImage:
         given, heres, mapped = self.model.patterns, [], []
         for k in range(given.count):
             pairs = [
-                *(self.put(self.joints, self.axes * x[k], x[k]) for x in (given.forces, given.moves)),
+                *(
+                    self.put(self.joints, self.axes * x[k], x[k])
+                    for x in (given.forces, given.moves)
+                ),
                 self.put(self.there, self.axes * given.lines[k], given.lines[k]),
                 self.put(self.there, given.length[k], given.length[k]),
                 *self.turning_effects(k),

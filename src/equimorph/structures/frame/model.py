@@ -109,6 +109,11 @@ class FrameModel(AnyFrameModel):
         x, y = (self._forces(axis, first[axis]) for axis in (0, 1))
         return x, y
 
+    @property
+    def starts(self) -> Float[np.ndarray, "scalars members 2"]:
+        """Forces at the starts of the members by scalar."""
+        return np.stack([each.start for each in self.forces], axis=2)
+
     def _forces(self, axis: int, first: int) -> Forces:
         graph, made = self.graphs[axis], self.network
         start, drop = np.zeros((2, self.scalars, len(self.lengths)))

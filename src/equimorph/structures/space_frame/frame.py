@@ -14,8 +14,8 @@ from equimorph.errors import InputError
 from equimorph.model import Descriptor, remember_call
 from equimorph.structures.contract import Readers, Symmetry, Written
 from equimorph.structures.discrete import STEPS, SURE
-from equimorph.structures.frame.images import find_images
 from equimorph.structures.frame.any_model import Actuators, Loads, Patterns
+from equimorph.structures.frame.images import find_images
 from equimorph.structures.network import Joints
 from equimorph.structures.newton import newton
 from equimorph.structures.space_frame.fields import SpatialFrameFields

@@ -52,6 +52,11 @@ class SpatialFrameModel(AnyFrameModel):
     # --- numbering ------------------------------------------------------------------------------
 
     @property
+    def starts(self) -> Float[np.ndarray, "scalars pieces 3"]:
+        """Forces at the starts of the pieces by scalar."""
+        return self.forces.members
+
+    @property
     def pieces(self) -> int:
         """Number of pieces of members."""
         return len(self.network.owner)

@@ -9,6 +9,7 @@ from equimorph.arrays import Lanes
 from equimorph.structures.frame.images import NOWHERE, Effects, FrameImage
 from equimorph.tolerances import SAME_NUMBER
 
+
 class SpatialImage(FrameImage):
     """An image of a frame in space.
 
@@ -26,12 +27,11 @@ class SpatialImage(FrameImage):
         """Number of nodes."""
         return len(self.model.turning)
 
-    @cached_property
-    def nodes(self) -> Int[np.ndarray, " nodes"]:
-        """The node at which each comes to be; nowhere if members do not hang together there."""
-        model, found = self.model, super().nodes
+    def complete(self, nodes: Int[np.ndarray, " nodes"]) -> Int[np.ndarray, " nodes"]:
+        """The same with parents of hinges that no member is rigidly joined to."""
+        model, found = self.model, nodes.copy()
         on = dict(zip(model.hinged.tolist(), model.parents.tolist(), strict=True))
-        for child, parent in on.items():  # what no member is rigidly joined to
+        for child, parent in on.items():
             if found[parent] == NOWHERE:
                 found[parent] = on.get(int(found[child]), NOWHERE)
         return found
@@ -77,9 +77,7 @@ class SpatialImage(FrameImage):
         moment = np.einsum("eiab,eb->eia", model.moment_of_strain, strain)
         moment = moment.reshape(model.pieces, -1, 3)
         bodies = self.nodes[: len(turns)]
-        return [
-            self.put(bodies, self.turn * turns, turns), (moment, self._along(bend * moment))
-        ]
+        return [self.put(bodies, self.turn * turns, turns), (moment, self._along(bend * moment))]
 
     def move(
         self, z: Lanes, scalars: Float[np.ndarray, "lanes scalars"]
