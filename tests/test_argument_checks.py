@@ -221,7 +221,8 @@ def public_functions(things: Things) -> Iterator[tuple[str, Callable[..., Any]]]
     """Functions, classes and methods that users call."""
     named = {name: getattr(em, name) for name in em.__all__}
     for layer in ("charts", "equilibria", "manifold", "model", "structures", "storage", "plotting"):
-        named |= {name: getattr(getattr(em, layer), name) for name in getattr(em, layer).__all__}
+        exported = vars(getattr(em, layer)).items()
+        named |= {name: thing for name, thing in exported if not name.startswith("_")}
     for name, thing in named.items():
         called = thing.__init__ if inspect.isclass(thing) else thing
         if is_checked(called) and name not in LEFT_OUT:

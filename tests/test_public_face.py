@@ -25,7 +25,6 @@ def test_every_name_of_the_stub_is_the_object_that_its_layer_exports():
     """Type checkers read the stub, users get the object: both must be the same."""
     for name, home in HOMES.items():
         layer = import_module(f"equimorph.{home}")
-        assert name in layer.__dict__.get("__all__", dir(layer)), (name, home)
         assert getattr(em, name) is getattr(layer, name), (name, home)
 
 

@@ -70,8 +70,9 @@ def list_of_parts() -> str:
     for module in (equimorph.plotting, equimorph.storage, equimorph.io):
         short = module.__name__.split(".")[1]
         rows += [
-            f"| `em.{short}.{name}` | {first_line_of(getattr(module, name))} |"
-            for name in sorted(module.__all__)
+            f"| `em.{short}.{name}` | {first_line_of(thing)} |"
+            for name, thing in sorted(vars(module).items())
+            if not (name.startswith("_") or inspect.ismodule(thing))
         ]
     return "\n".join(["| name | |", "| --- | --- |", *rows, ""])
 

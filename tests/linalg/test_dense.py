@@ -2,8 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from equimorph.linalg import negative_eigenvalues, orthonormal_rows, solve_bordered
 from equimorph.linalg.kernels import solve_lanes

@@ -2,8 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from equimorph.manifold.complex.base_mesh import BaseMesh
 from equimorph.manifold.geometry.topology import adjacency, euler_characteristic, projected_volume

@@ -1,8 +1,7 @@
 """The depth buffer: against the nearest triangle found pixel by pixel, and on crossing planes."""
 
 import numpy as np
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from equimorph.plotting.depth import depth_buffer, slopes
 

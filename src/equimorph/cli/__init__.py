@@ -1,5 +1,3 @@
 """The command line."""
 
-from equimorph.cli.app import main
-
-__all__ = ["main"]
+from equimorph.cli.app import main as main

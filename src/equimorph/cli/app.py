@@ -229,8 +229,7 @@ def replay(
     as_json: AsJson = False,
 ) -> None:
     """Replay a schedule in time in MuJoCo; exit code 3 if the structure snaps."""
-    from equimorph.cli.replay import as_json as numbers
-    from equimorph.cli.replay import lines, replay_file
+    from equimorph.cli.replay import as_json as numbers, lines, replay_file
 
     played = replay_file(file, rate=rate, simulator=simulator, links=links, picture=picture)
     for line in [numbers(played)] if as_json else lines(played):

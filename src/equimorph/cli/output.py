@@ -13,12 +13,12 @@ from rich.console import Console, RenderableType
 from rich.progress import (
     BarColumn,
     MofNCompleteColumn,
+    Progress as Bars,
     SpinnerColumn,
     TaskID,
     TextColumn,
     TimeElapsedColumn,
 )
-from rich.progress import Progress as Bars
 
 from equimorph.logs import PACKAGE, log_of
 from equimorph.model import Progress, Silent

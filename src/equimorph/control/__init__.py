@@ -1,6 +1,4 @@
 """Closed-loop control on a ready equilibrium set: estimate, keep clear of snaps, follow, replan."""
 
-from equimorph.control.belief import Belief, ControlStatus
-from equimorph.control.controller import Controller
-
-__all__ = ["Belief", "ControlStatus", "Controller"]
+from equimorph.control.belief import Belief as Belief, ControlStatus as ControlStatus
+from equimorph.control.controller import Controller as Controller

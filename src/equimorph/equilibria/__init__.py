@@ -1,82 +1,55 @@
 """Equilibria: solving, lifting, events, limit loads, searching."""
 
 from equimorph.equilibria.critical_curves import (
-    CriticalCurve,
-    branch_curve,
-    constraint_curve,
-    cusp_curve,
-    fold_curve,
-    grazing_curve,
+    CriticalCurve as CriticalCurve,
+    branch_curve as branch_curve,
+    constraint_curve as constraint_curve,
+    cusp_curve as cusp_curve,
+    fold_curve as fold_curve,
+    grazing_curve as grazing_curve,
 )
-from equimorph.equilibria.curves import ParameterLine
-from equimorph.equilibria.energy_barriers import EnergyBarrier, EnergyPath, Merge
-from equimorph.equilibria.legs import Leg, Waypoint
-from equimorph.equilibria.lift import Event, Lifts, Path, check_start, lift, way_points
-from equimorph.equilibria.limit_load import LimitLoad, LimitLoads, limit_load
-from equimorph.equilibria.load_cycles import LoadCycle, load_cycle
-from equimorph.equilibria.paths import lift_legs
-from equimorph.equilibria.random_search import distinct
-from equimorph.equilibria.search import Completeness, FoundStates, find_equilibria, search_points
-from equimorph.equilibria.settle import Guards, Settled, settle
-from equimorph.equilibria.snap import Landing, snap_landing
-from equimorph.equilibria.switching import Branch, branches
-from equimorph.equilibria.trace import Traces, trace
-from equimorph.equilibria.trace_options import EventKind, TraceOptions
-from equimorph.equilibria.transitions import TransitionNetwork, transition_network
+from equimorph.equilibria.curves import ParameterLine as ParameterLine
+from equimorph.equilibria.energy_barriers import (
+    EnergyBarrier as EnergyBarrier,
+    EnergyPath as EnergyPath,
+    Merge as Merge,
+)
+from equimorph.equilibria.legs import Leg as Leg, Waypoint as Waypoint
+from equimorph.equilibria.lift import (
+    Event as Event,
+    Lifts as Lifts,
+    Path as Path,
+    check_start as check_start,
+    lift as lift,
+    way_points as way_points,
+)
+from equimorph.equilibria.limit_load import (
+    LimitLoad as LimitLoad,
+    LimitLoads as LimitLoads,
+    limit_load as limit_load,
+)
+from equimorph.equilibria.load_cycles import LoadCycle as LoadCycle, load_cycle as load_cycle
+from equimorph.equilibria.paths import lift_legs as lift_legs
+from equimorph.equilibria.random_search import distinct as distinct
+from equimorph.equilibria.search import (
+    Completeness as Completeness,
+    FoundStates as FoundStates,
+    find_equilibria as find_equilibria,
+    search_points as search_points,
+)
+from equimorph.equilibria.settle import Guards as Guards, Settled as Settled, settle as settle
+from equimorph.equilibria.snap import Landing as Landing, snap_landing as snap_landing
+from equimorph.equilibria.switching import Branch as Branch, branches as branches
+from equimorph.equilibria.trace import Traces as Traces, trace as trace
+from equimorph.equilibria.trace_options import EventKind as EventKind, TraceOptions as TraceOptions
+from equimorph.equilibria.transitions import (
+    TransitionNetwork as TransitionNetwork,
+    transition_network as transition_network,
+)
 from equimorph.equilibria.worst_cases import (
-    Corner,
-    corners_of,
-    stable_over,
-    worst_named,
-    worst_over,
+    Corner as Corner,
+    corners_of as corners_of,
+    stable_over as stable_over,
+    worst_named as worst_named,
+    worst_over as worst_over,
 )
-
-__all__ = [
-    "Branch",
-    "Completeness",
-    "Corner",
-    "CriticalCurve",
-    "EnergyBarrier",
-    "EnergyPath",
-    "Event",
-    "EventKind",
-    "FoundStates",
-    "Guards",
-    "Landing",
-    "Leg",
-    "Lifts",
-    "LimitLoad",
-    "LimitLoads",
-    "LoadCycle",
-    "Merge",
-    "ParameterLine",
-    "Path",
-    "Settled",
-    "TraceOptions",
-    "Traces",
-    "TransitionNetwork",
-    "Waypoint",
-    "branch_curve",
-    "branches",
-    "check_start",
-    "constraint_curve",
-    "corners_of",
-    "cusp_curve",
-    "distinct",
-    "find_equilibria",
-    "fold_curve",
-    "grazing_curve",
-    "lift",
-    "lift_legs",
-    "limit_load",
-    "load_cycle",
-    "search_points",
-    "settle",
-    "snap_landing",
-    "stable_over",
-    "trace",
-    "transition_network",
-    "way_points",
-    "worst_named",
-    "worst_over",
-]

@@ -14,8 +14,7 @@ import numpy as np
 
 from equimorph.array_types import Float
 from equimorph.arrays import Flags, Lanes, Parameters, Some, Values
-from equimorph.equilibria import event_kernels as roots
-from equimorph.equilibria import kernels
+from equimorph.equilibria import event_kernels as roots, kernels
 from equimorph.equilibria.critical import Critical, normal_form, null_border
 from equimorph.equilibria.curves import (
     AlongCurve,

@@ -9,8 +9,7 @@ import numpy as np
 
 from equimorph.array_types import Float
 from equimorph.arrays import Flags, Lanes, Numbers, Some, Values
-from equimorph.equilibria import kernels
-from equimorph.equilibria import step_kernels as stepping
+from equimorph.equilibria import kernels, step_kernels as stepping
 from equimorph.equilibria.curves import Curve, squared_length
 from equimorph.equilibria.events import Events, events_at
 from equimorph.equilibria.inside_steps import NARROW, Span, inside_spans

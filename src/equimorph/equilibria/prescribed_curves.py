@@ -12,8 +12,7 @@ from equimorph.array_types import Float, Int
 from equimorph.arrays import Lanes, Numbers, Parameters, Some, Values
 from equimorph.equilibria.critical import Critical
 from equimorph.equilibria.curves import PlainCurve
-from equimorph.equilibria.point_conditions import Linear, Move
-from equimorph.equilibria.point_conditions import Values as DescriptorValues
+from equimorph.equilibria.point_conditions import Linear, Move, Values as DescriptorValues
 from equimorph.errors import InputError
 from equimorph.linalg import BorderedSolution
 from equimorph.model import Descriptor

@@ -1,5 +1,3 @@
 """One offline HTML page in which an equilibrium set can be turned, walked on and asked."""
 
-from equimorph.explorer.page import explore
-
-__all__ = ["explore"]
+from equimorph.explorer.page import explore as explore

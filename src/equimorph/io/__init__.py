@@ -1,5 +1,3 @@
 """Geometry that other programs drew, for trusses and frames."""
 
-from equimorph.io.lines import Lines, read_lines
-
-__all__ = ["Lines", "read_lines"]
+from equimorph.io.lines import Lines as Lines, read_lines as read_lines

@@ -1,25 +1,13 @@
 """Symmetric indefinite saddle-point matrices in batches of lanes, with their inertia."""
 
-from equimorph.linalg.condensed import CondensedLayout
+from equimorph.linalg.condensed import CondensedLayout as CondensedLayout
 from equimorph.linalg.dense import (
-    Border,
-    BorderedSolution,
-    multiply,
-    negative_eigenvalues,
-    no_border,
-    orthonormal_rows,
-    solve_bordered,
+    Border as Border,
+    BorderedSolution as BorderedSolution,
+    multiply as multiply,
+    negative_eigenvalues as negative_eigenvalues,
+    no_border as no_border,
+    orthonormal_rows as orthonormal_rows,
+    solve_bordered as solve_bordered,
 )
-from equimorph.linalg.lanes import set_threads
-
-__all__ = [
-    "Border",
-    "BorderedSolution",
-    "CondensedLayout",
-    "multiply",
-    "negative_eigenvalues",
-    "no_border",
-    "orthonormal_rows",
-    "set_threads",
-    "solve_bordered",
-]
+from equimorph.linalg.lanes import set_threads as set_threads

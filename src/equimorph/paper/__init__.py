@@ -1,5 +1,3 @@
 """The article by Fehér, Sipos and Várkonyi, reproduced with the public API of the library."""
 
-from equimorph.paper.reproduction import Reproduction, reproduce
-
-__all__ = ["Reproduction", "reproduce"]
+from equimorph.paper.reproduction import Reproduction as Reproduction, reproduce as reproduce

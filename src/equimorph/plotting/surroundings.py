@@ -14,8 +14,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.lines import Line2D
 from matplotlib.patches import Polygon
-from matplotlib.patheffects import AbstractPathEffect
-from matplotlib.patheffects import Stroke as Casing
+from matplotlib.patheffects import AbstractPathEffect, Stroke as Casing
 
 from equimorph.array_types import Float
 from equimorph.model import ActuatorKind, Constraint, Drawing, Obstacle, Support, SupportKind

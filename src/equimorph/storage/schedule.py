@@ -22,8 +22,7 @@ import numpy as np
 
 from equimorph.argument_checks import check_arguments
 from equimorph.array_types import Float
-from equimorph.equilibria import Event
-from equimorph.equilibria import Path as StatePath
+from equimorph.equilibria import Event, Path as StatePath
 from equimorph.errors import InputError
 from equimorph.model import Schedule
 from equimorph.model.schedule import DERIVATIVES, MARGIN, PROGRESS, TIME, column_of

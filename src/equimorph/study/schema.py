@@ -11,8 +11,7 @@ from collections.abc import Callable, Mapping
 from typing import Any, get_args
 
 from equimorph.model import Parameter
-from equimorph.structures import KINDS as STRUCTURES
-from equimorph.structures import Bar, Member, SpatialMember, Unknown
+from equimorph.structures import KINDS as STRUCTURES, Bar, Member, SpatialMember, Unknown
 from equimorph.study.extent import PointSection, SetSection
 from equimorph.study.fields import Section
 from equimorph.study.kinds import KINDS

@@ -29,8 +29,7 @@ from equimorph.model import (
     Workers,
 )
 from equimorph.structures import State, States, Structure
-from equimorph.study import arguments as given
-from equimorph.study import composite_arguments as composite
+from equimorph.study import arguments as given, composite_arguments as composite
 from equimorph.study.arguments import Argument
 from equimorph.study.fields import (
     ComparisonText,

@@ -5,8 +5,7 @@ import re
 import casadi as ca
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 import equimorph as em
 from equimorph.errors import InputError

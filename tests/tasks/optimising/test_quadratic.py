@@ -1,8 +1,7 @@
 """Small quadratic programmes against their optimality conditions and dense search."""
 
 import numpy as np
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from equimorph.tasks.optimising.quadratic import Quadratic, solve
 

@@ -16,8 +16,13 @@ from equimorph.array_types import Float
 from equimorph.arrays import Flags, Frames, Lanes, Numbers, Parameters, Rows, Values
 from equimorph.columns import Columns
 from equimorph.equilibria.critical import null_border
-from equimorph.equilibria.point_conditions import Condition, Crossing, Fold, Plane
-from equimorph.equilibria.point_conditions import Values as TakesValues
+from equimorph.equilibria.point_conditions import (
+    Condition,
+    Crossing,
+    Fold,
+    Plane,
+    Values as TakesValues,
+)
 from equimorph.equilibria.settle import Guards, Planes, Settled, Tangents, settle
 from equimorph.manifold.geometry.crossings import reduction
 from equimorph.manifold.geometry.points import Points, VertexKind

@@ -34,8 +34,7 @@ from equimorph.structures.rod.space_options import SpaceOptions
 from equimorph.structures.rod.terms import Term
 from equimorph.structures.rod.units import Units
 from equimorph.structures.states import State, States
-from equimorph.structures.unit_system import Quantity, unit_system
-from equimorph.structures.unit_system import Units as SystemSpec
+from equimorph.structures.unit_system import Quantity, Units as SystemSpec, unit_system
 
 ARCS = 128
 """Number of cubic arcs along a rod: their error is below 1e-10 for κ = 10."""

@@ -6,8 +6,7 @@ import numpy as np
 
 from equimorph.array_types import Float
 from equimorph.arrays import Lanes, Parameters, Values
-from equimorph.model import Actuator, ActuatorKind, Couples, Drawing, Forces
-from equimorph.model import Support as Symbol
+from equimorph.model import Actuator, ActuatorKind, Couples, Drawing, Forces, Support as Symbol
 from equimorph.model.drawing import supports_of_point
 from equimorph.structures.rod.any_rod import AnyRod
 from equimorph.structures.rod.centreline import Centreline, Vectors

@@ -1,7 +1,5 @@
 """Elastic rods in space."""
 
-from equimorph.structures.spatial.ends import SpatialEnd
-from equimorph.structures.spatial.fields import Fields
-from equimorph.structures.spatial.rod import SpatialRod
-
-__all__ = ["Fields", "SpatialEnd", "SpatialRod"]
+from equimorph.structures.spatial.ends import SpatialEnd as SpatialEnd
+from equimorph.structures.spatial.fields import Fields as Fields
+from equimorph.structures.spatial.rod import SpatialRod as SpatialRod

@@ -31,8 +31,7 @@ from equimorph.study.question import Arguments, DataTable, Figure, Kind, Questio
 from equimorph.tables import Column, Table
 from equimorph.tasks.calibration.calibrate import Calibration, calibrate
 from equimorph.tasks.calibration.measurements import MeasuredShape
-from equimorph.tasks.calibration.unknowns import Family
-from equimorph.tasks.calibration.unknowns import Kind as UnknownKind
+from equimorph.tasks.calibration.unknowns import Family, Kind as UnknownKind
 from equimorph.tasks.estimation import StateEstimate, estimate_state
 from equimorph.tasks.shapes.solutions import Shapes, solve_shape
 
