@@ -16,13 +16,7 @@ from equimorph.array_types import Float
 from equimorph.arrays import Flags, Lanes, Parameters, Some, Values
 from equimorph.equilibria import event_kernels as roots, kernels
 from equimorph.equilibria.critical import Critical, normal_form, null_border
-from equimorph.equilibria.curves import (
-    AlongCurve,
-    Curve,
-    along_parameters,
-    dual,
-    squared_length,
-)
+from equimorph.equilibria.curves import AlongCurve, Curve, along_parameters, dual, squared_length
 from equimorph.equilibria.kernels import cubic_shares
 from equimorph.equilibria.newton_step import Planes
 from equimorph.equilibria.point_conditions import Crossing

@@ -8,11 +8,7 @@ from equimorph.array_types import Float, Int
 from equimorph.arrays import Flags, Lanes, Numbers, Parameters, Some, Values
 from equimorph.columns import Columns
 from equimorph.equilibria.critical import Critical, null_border
-from equimorph.equilibria.newton_kernels import (
-    amount_lanes,
-    move_lanes,
-    null_lanes,
-)
+from equimorph.equilibria.newton_kernels import amount_lanes, move_lanes, null_lanes
 from equimorph.equilibria.point_conditions import Condition, Directions, Linear, Move
 from equimorph.linalg import orthonormal_rows
 from equimorph.structures import Equations, LinearSystem, Structure

@@ -23,16 +23,7 @@ from equimorph.linalg.kernels import (
     solve_lanes,
     write_lanes,
 )
-from equimorph.linalg.simd import (
-    LANES,
-    load,
-    load4,
-    repeat4,
-    spread,
-    stack2,
-    store,
-    work_rows,
-)
+from equimorph.linalg.simd import LANES, load, load4, repeat4, spread, stack2, store, work_rows
 
 START, SIDES = np.int64(0), np.int64(2)
 """Two right-hand sides are substituted back side by side."""

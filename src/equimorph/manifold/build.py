@@ -33,15 +33,7 @@ from equimorph.manifold.lifting.pairing import Pairing, start_pairing
 from equimorph.manifold.lifting.seeds import Seeds, is_symmetric, seeds
 from equimorph.manifold.lifting.unseen import UnseenFinder
 from equimorph.manifold.refining.refine import refine_cells
-from equimorph.model import (
-    Box,
-    Constraint,
-    Journal,
-    Progress,
-    Silent,
-    parameter_vector,
-    position,
-)
+from equimorph.model import Box, Constraint, Journal, Progress, Silent, parameter_vector, position
 from equimorph.structures import Structure
 from equimorph.tolerances import SAME_TO_ROUNDING
 

@@ -17,15 +17,7 @@ from equimorph.charts import (
     rule_from,
 )
 from equimorph.errors import InputError
-from equimorph.storage.hdf import (
-    get,
-    get_json,
-    open_file,
-    put,
-    put_json,
-    put_parameters,
-    write,
-)
+from equimorph.storage.hdf import get, get_json, open_file, put, put_json, put_parameters, write
 from equimorph.storage.owner import Owner
 from equimorph.storage.sets import read_set, write_set
 from equimorph.storage.values import read_states

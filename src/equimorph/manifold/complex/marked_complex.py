@@ -36,10 +36,7 @@ from equimorph.manifold.complex.vertices import (
 from equimorph.manifold.geometry.kernels import cut_rows, look_back, number_edges, square_sides
 from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.setting import Setting, embed
-from equimorph.manifold.geometry.tangents import (
-    Ends,
-    best_corners,
-)
+from equimorph.manifold.geometry.tangents import Ends, best_corners
 from equimorph.manifold.geometry.topology import (
     adjacency,
     cut_at_crossings,

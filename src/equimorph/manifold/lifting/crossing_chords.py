@@ -11,12 +11,7 @@ from equimorph.array_types import Bool
 from equimorph.manifold.geometry.crossings import crossing_directions
 from equimorph.manifold.geometry.exact_points import pin_crossings
 from equimorph.manifold.lifting.cells import Cells
-from equimorph.manifold.lifting.fold_chords import (
-    Turns,
-    chords_across,
-    lie_inside,
-    ways_out,
-)
+from equimorph.manifold.lifting.fold_chords import Turns, chords_across, lie_inside, ways_out
 from equimorph.manifold.lifting.pairing import Pairing
 from equimorph.manifold.lifting.polygon_cuts import planes
 

@@ -15,12 +15,7 @@ from equimorph.array_types import Float
 from equimorph.arrays import ItemValues
 from equimorph.equilibria.critical import Critical, null_border
 from equimorph.equilibria.settle import lower_index
-from equimorph.manifold.geometry.exact_points import (
-    Aim,
-    Pinned,
-    correct_points,
-    pin_crossings,
-)
+from equimorph.manifold.geometry.exact_points import Aim, Pinned, correct_points, pin_crossings
 from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.lifting.pairing import Pairing

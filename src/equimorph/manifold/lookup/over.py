@@ -33,12 +33,7 @@ from equimorph.manifold.lookup.exact_states import (
     lifts_across_folds,
     nearest_pairs,
 )
-from equimorph.manifold.lookup.kernels import (
-    balanced,
-    guesses,
-    one_of_each,
-    worth_trying,
-)
+from equimorph.manifold.lookup.kernels import balanced, guesses, one_of_each, worth_trying
 from equimorph.manifold.lookup.near_crossings import NearCrossings
 from equimorph.model import Constraint, are_feasible
 from equimorph.structures import States, Structure

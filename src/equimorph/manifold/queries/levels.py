@@ -20,12 +20,7 @@ from equimorph.manifold.complex.cuts import (
 )
 from equimorph.manifold.complex.description import describe_again
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
-from equimorph.manifold.complex.marked_complex import (
-    Fabric,
-    FacetMark,
-    ends_of_changes,
-    fabric_of,
-)
+from equimorph.manifold.complex.marked_complex import Fabric, FacetMark, ends_of_changes, fabric_of
 from equimorph.manifold.complex.vertices import Vertices
 from equimorph.manifold.geometry.points import VertexKind, on_fold
 from equimorph.manifold.geometry.setting import Setting, embed

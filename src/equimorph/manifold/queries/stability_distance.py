@@ -18,12 +18,7 @@ from equimorph.manifold.geometry.topology import faces_of
 from equimorph.manifold.queries.geodesics import Chains
 from equimorph.manifold.queries.least_squares import nearest as nearest_points
 from equimorph.manifold.queries.locate import pieces_of
-from equimorph.manifold.queries.nearest import (
-    Ground,
-    SetPoints,
-    local_minima,
-    points_at_vertices,
-)
+from equimorph.manifold.queries.nearest import Ground, SetPoints, local_minima, points_at_vertices
 from equimorph.manifold.queries.snap_graph import stability_boundary
 from equimorph.structures import State, States
 

@@ -15,12 +15,7 @@ import numpy as np
 from equimorph.array_types import Bool, Float, Int
 from equimorph.arrays import Cells, Edges, ItemFlags, Items, ItemValues, Pairs, VertexFlags
 from equimorph.columns import Columns
-from equimorph.manifold.complex.marked_complex import (
-    CURVES,
-    Fabric,
-    FacetMark,
-    squared_sides,
-)
+from equimorph.manifold.complex.marked_complex import CURVES, Fabric, FacetMark, squared_sides
 from equimorph.manifold.complex.vertices import Vertices
 from equimorph.manifold.geometry.topology import among, count_corners, distinct, keys_of, rows_of
 from equimorph.manifold.refining.quality import POOR, determinants, smallest_angles

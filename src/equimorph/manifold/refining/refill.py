@@ -22,14 +22,7 @@ from equimorph.manifold.refining.deviation import Memory, deviations
 from equimorph.manifold.refining.edge_stars import reconnections
 from equimorph.manifold.refining.kernels import flip_edges
 from equimorph.manifold.refining.quality import qualities, qualities_near
-from equimorph.manifold.refining.stars import (
-    GAIN,
-    Quality,
-    Refills,
-    gains,
-    hopeful,
-    with_exact,
-)
+from equimorph.manifold.refining.stars import GAIN, Quality, Refills, gains, hopeful, with_exact
 from equimorph.manifold.refining.vertex_stars import collapses, moves
 
 ROUNDS = {2: (2, 3), 3: (6, 12)}

@@ -9,13 +9,7 @@ from equimorph.arrays import Lanes, Nodal, Parameters, Sides, Values, Velocity
 from equimorph.linalg import BorderedSolution, CondensedLayout, multiply, no_border
 from equimorph.linalg.lanes import over_lanes
 from equimorph.structures.contract import Symmetry
-from equimorph.structures.equations import (
-    Advance,
-    AnyBorder,
-    Direction,
-    LinearSystem,
-    Shift,
-)
+from equimorph.structures.equations import Advance, AnyBorder, Direction, LinearSystem, Shift
 from equimorph.structures.rod.clamped_derivative_kernels import (
     linearise_lanes,
     matrix_lanes,

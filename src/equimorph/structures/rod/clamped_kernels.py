@@ -19,13 +19,7 @@ from equimorph.linalg.condensed_kernels import (
     start_block,
     work_arrays,
 )
-from equimorph.linalg.kernels import (
-    FLAGS,
-    INNER,
-    read_lanes,
-    solve_lanes,
-    write_lanes,
-)
+from equimorph.linalg.kernels import FLAGS, INNER, read_lanes, solve_lanes, write_lanes
 from equimorph.linalg.simd import (
     LANES,
     absolute,

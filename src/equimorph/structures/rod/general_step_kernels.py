@@ -13,15 +13,7 @@ from equimorph.linalg.bordered_kernels import (
 from equimorph.linalg.compiled import njit
 from equimorph.linalg.condensed_kernels import TILE, pivot_ratio, work_arrays
 from equimorph.linalg.kernels import FLAGS, INNER, read_lanes, solve_lanes, write_lanes
-from equimorph.linalg.simd import (
-    LANES,
-    absolute,
-    load,
-    spread,
-    store,
-    where_less,
-    work_rows,
-)
+from equimorph.linalg.simd import LANES, absolute, load, spread, store, where_less, work_rows
 from equimorph.structures.rod.general_kernels import assemble_block
 
 COLUMNS, SIDES = np.int64(1), np.int64(2)

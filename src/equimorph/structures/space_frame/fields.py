@@ -16,12 +16,7 @@ from equimorph.structures.space_frame.mechanics import SpatialFrameMechanics
 from equimorph.structures.space_frame.model import SpatialFrameModel
 from equimorph.structures.space_frame.network import SpatialNetwork, Turning
 from equimorph.structures.space_frame.statics import SpaceFlows
-from equimorph.structures.spatial.quaternions import (
-    RIGHT,
-    exponential,
-    matrices,
-    rotation_vectors,
-)
+from equimorph.structures.spatial.quaternions import RIGHT, exponential, matrices, rotation_vectors
 
 
 def spatial_symbols(

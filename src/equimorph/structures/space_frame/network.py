@@ -11,12 +11,7 @@ import numpy as np
 from equimorph.array_types import Float, Int
 from equimorph.errors import InputError
 from equimorph.structures.frame.any_model import WEIGHT, AnyFrameNetwork
-from equimorph.structures.network import (
-    Joints,
-    edges_between,
-    places_of_joints,
-    supported_joints,
-)
+from equimorph.structures.network import Joints, edges_between, places_of_joints, supported_joints
 from equimorph.structures.space_frame.member import (
     BALL,
     FREE,

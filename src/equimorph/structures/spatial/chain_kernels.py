@@ -7,16 +7,7 @@ import numpy as np
 
 from equimorph.linalg.compiled import njit
 from equimorph.linalg.kernels import INNER
-from equimorph.linalg.simd import (
-    absolute,
-    load,
-    load2,
-    repeat2,
-    spread,
-    stack2,
-    store,
-    where_less,
-)
+from equimorph.linalg.simd import absolute, load, load2, repeat2, spread, stack2, store, where_less
 from equimorph.structures.spatial.force_kernels import BORDER, COLUMN, FORCE, ROW
 from equimorph.structures.spatial.node_kernels import (
     COUNT,

@@ -20,10 +20,7 @@ from equimorph.structures.equations import (
     Solver,
 )
 from equimorph.structures.spatial.derivative_kernels import equations_lanes
-from equimorph.structures.spatial.lagrangian import (
-    LENGTH_STIFFNESS,
-    SpatialLagrangian,
-)
+from equimorph.structures.spatial.lagrangian import LENGTH_STIFFNESS, SpatialLagrangian
 from equimorph.structures.spatial.model import SpatialModel
 from equimorph.structures.spatial.quaternions import PAIRS, Jet
 from equimorph.structures.spatial.solve_kernels import solve_bordered_lanes

@@ -20,13 +20,7 @@ from equimorph.equilibria.newton_step import free_directions
 from equimorph.errors import InputError
 from equimorph.model import Descriptor, remake
 from equimorph.structures import State, Structure
-from equimorph.tasks.designing.family import (
-    Carried,
-    DesignFamily,
-    Scalars,
-    Vector,
-    default_changes,
-)
+from equimorph.tasks.designing.family import Carried, DesignFamily, Scalars, Vector, default_changes
 from equimorph.tasks.optimising.programme import Objective, match_branches
 
 Follow = Callable[[Structure, State], "Piece | None"]

@@ -25,12 +25,7 @@ from equimorph.model import (
 from equimorph.structures import State, States, Structure
 from equimorph.tables import Table, Tabular, html_table, units_of
 from equimorph.tasks.maps.causes import Paths
-from equimorph.tasks.maps.curves import (
-    MapCurve,
-    curves_through,
-    edge_of_definition,
-    places_on,
-)
+from equimorph.tasks.maps.curves import MapCurve, curves_through, edge_of_definition, places_on
 from equimorph.tolerances import IN_BOX
 
 

@@ -16,12 +16,7 @@ from equimorph.equilibria.settle import distances
 from equimorph.model import Constraint
 from equimorph.structures import State, join_states
 from equimorph.tasks.motion.blocks import Stretch
-from equimorph.tasks.motion.course import (
-    Course,
-    correct_onto_targets,
-    linearise,
-    shortest_change,
-)
+from equimorph.tasks.motion.course import Course, correct_onto_targets, linearise, shortest_change
 
 TOLERANCE = 1e-8
 """Error of a step, in the metric and scaled parameters."""

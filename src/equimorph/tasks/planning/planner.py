@@ -13,11 +13,7 @@ from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Constraint, Descriptor
 from equimorph.structures import State
-from equimorph.tasks.planning.free_routes import (
-    free_route,
-    route_with_lowest_peak,
-    with_extreme,
-)
+from equimorph.tasks.planning.free_routes import free_route, route_with_lowest_peak, with_extreme
 from equimorph.tasks.planning.network import Demands
 from equimorph.tasks.planning.objectives import Extreme, Wish
 from equimorph.tasks.planning.refusals import explained_refusal
