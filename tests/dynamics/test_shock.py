@@ -5,11 +5,10 @@ import pytest
 
 import equimorph as em
 from equimorph.dynamics.model import landing
-from equimorph.dynamics.outcomes import Clock, Launches, Outcome, play
-from equimorph.dynamics.pushes import least_force
+from equimorph.dynamics.outcomes import Clock, Launches, Outcome, least_force, play
+from equimorph.dynamics.own import Motion
 from equimorph.dynamics.shock import _Trial
 from equimorph.dynamics.simulators import model_of
-from equimorph.dynamics.time_steps import Motion
 from equimorph.errors import InputError
 from equimorph.structures.contract import Structure
 from equimorph.structures.pushed import Pushed

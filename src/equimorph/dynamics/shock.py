@@ -12,11 +12,9 @@ import numpy as np
 from equimorph.argument_checks import check_arguments
 from equimorph.array_types import Float
 from equimorph.arrays import Flags, Values
-from equimorph.dynamics.outcomes import Clock, Launches, Outcome, play, relax
-from equimorph.dynamics.own import OwnModel
-from equimorph.dynamics.pushes import least_force
+from equimorph.dynamics.outcomes import Clock, Launches, Outcome, least_force, play, relax
+from equimorph.dynamics.own import Motion, OwnModel
 from equimorph.dynamics.replay import ReplaySettings
-from equimorph.dynamics.time_steps import Motion
 from equimorph.equilibria import EnergyBarrier, TransitionNetwork, lift, transition_network
 from equimorph.equilibria.gradient_flow import implicit_step
 from equimorph.equilibria.lift import check_start

@@ -10,7 +10,10 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from equimorph.array_types import Float, Int
-from equimorph.dynamics.cells import (
+from equimorph.dynamics.chained import Chained
+from equimorph.dynamics.mechanism import LIGHT, Settings, Vector
+from equimorph.dynamics.plant import Simulation
+from equimorph.dynamics.rods import (
     Function,
     between,
     holding_stiffness,
@@ -19,9 +22,6 @@ from equimorph.dynamics.cells import (
     thrust,
     time_of,
 )
-from equimorph.dynamics.chained import Chained
-from equimorph.dynamics.mechanism import LIGHT, Settings, Vector
-from equimorph.dynamics.plant import Simulation
 from equimorph.dynamics.spatial_chain import (
     ANCHOR,
     CLAMP_AXES,

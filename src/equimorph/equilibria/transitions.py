@@ -17,9 +17,9 @@ from equimorph.equilibria.descents import NUDGES, descend
 from equimorph.equilibria.energy_barriers import EnergyBarrier, EnergyPath, Merge
 from equimorph.equilibria.gradient_flow import FAITHFUL, SMOOTH
 from equimorph.equilibria.minima_graph import NONE, Argument, arguments_of
+from equimorph.equilibria.saddles import Nowhere, ways_over
 from equimorph.equilibria.search import Completeness, search_with_graph
 from equimorph.equilibria.soft_modes import metric_length
-from equimorph.equilibria.ways import Nowhere, ways_over
 from equimorph.errors import InputError
 from equimorph.model import Constraint, parameter_vector
 from equimorph.structures import State, States, Structure, join_states

@@ -12,8 +12,8 @@ from equimorph.array_types import Float, Int
 from equimorph.arrays import Flags, Lanes, Numbers, Parameters, Some
 from equimorph.equilibria.descents import descend
 from equimorph.equilibria.gradient_flow import FAITHFUL, Ending
+from equimorph.equilibria.saddles import Nowhere
 from equimorph.equilibria.soft_modes import metric_length
-from equimorph.equilibria.ways import Nowhere
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.manifold.lookup.exact_states import StatesOver, exact_states, lift_to
 from equimorph.model import Progress

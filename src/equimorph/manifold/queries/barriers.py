@@ -13,9 +13,9 @@ from equimorph.argument_checks import check_arguments
 from equimorph.array_types import Bool, Float, Int
 from equimorph.arrays import Flags, ItemValues, Lanes, Numbers, Parameters, Some, Values
 from equimorph.equilibria import EnergyBarrier
+from equimorph.equilibria.saddles import Nowhere, ways_over
 from equimorph.equilibria.snap import CRITICAL
 from equimorph.equilibria.soft_modes import metric_length
-from equimorph.equilibria.ways import Nowhere, ways_over
 from equimorph.errors import InputError
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.manifold.geometry.points import on_fold
