@@ -144,6 +144,34 @@ def test_solves_with_a_spring_and_two_borders_are_those_of_the_whole_matrix(opti
             assert found.pivoted.mean() < 0.1
 
 
+@pytest.mark.parametrize("options", [{}, {"axial": 400.0, "shear": 150.0}])
+def test_steps_with_the_condition_applied_afterwards_are_those_of_the_whole_matrix(options):
+    """At equilibria, whatever the row of the curve; off them they differ by first order in F.
+
+    Against F_z with the condition, eliminated with pivots; 1e-9: conditions reach 1e6.
+    """
+    rod = em.SpatialRod(**{**ROUND, **options}, phase=True)
+    states = em.lift(rod.natural_state(twist_B=6.0), {"nu": -0.1}).states
+    rng, mechanics, gap = np.random.default_rng(18), rod.mechanics, {}
+    dp, row = rng.standard_normal(states.p.shape), rng.standard_normal(states.z.shape)
+    corner, defect = rng.standard_normal((2, len(states)))
+    for size in (0.0, 1e-9):
+        z = states.z + size * rng.standard_normal(states.z.shape)
+        step = mechanics.advance(z, states.p, dp, row, corner, defect)
+        rate = mechanics.parameter_derivative(z, states.p, dp)
+        border = row[:, None], rate[:, None], corner[:, None, None]
+        sides = np.concatenate([-mechanics.residual(z, states.p), -defect[:, None]], axis=1)
+        entries = mechanics.entries(z, states.p)
+        whole = mechanics.layout.solve(entries, (rate[:, None], row[:, None], border[2]),
+                                       sides[:, None])  # fmt: skip
+        found = np.concatenate([step.dz, step.dt[:, None]], axis=1)
+        gap[size] = np.abs(found - whole.x[:, 0]).max() / np.abs(whole.x).max()
+        np.testing.assert_array_equal(step.index, whole.negative - mechanics.constraints)
+        np.testing.assert_allclose(step.determinant, whole.determinant, rtol=1e-9 + 1e3 * size)
+    assert gap[0.0] < 1e-9
+    assert gap[1e-9] < 1e-4
+
+
 # --- applied by itself ---------------------------------------------------------------------------
 
 

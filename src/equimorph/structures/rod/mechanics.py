@@ -106,22 +106,33 @@ class RodMechanics(Equations):
         row: Lanes,
         corner: Values,
         defect: Values,
+        *more: np.ndarray,
     ) -> Advance:
         """`advance` by one kernel; lanes with an unsafe pivot take the general solve."""
-        lanes = len(z)
         z, p, row, dp = self.check_widths((z, p), (row, dp))
-        inputs = [z, p, dp, row, np.ascontiguousarray(corner), np.ascontiguousarray(defect)]
+        given = z, p, dp, row, corner, defect
+        return self.pivot_steps(*self.fused_step(kernel, shared, *given, *more), *given)
+
+    def fused_step(
+        self, kernel: Callable[..., None], shared: tuple[object, ...], z: Lanes, *more: np.ndarray
+    ) -> tuple[Advance, Values]:
+        """Steps by one kernel, with the ratios of their pivots."""
+        lanes = len(z)
+        inputs = [np.ascontiguousarray(each) for each in (z, *more)]
         # one block each: memory that is released at once stays with the process, without new pages
-        dz, tangent_z = np.empty((2, lanes, self.size))
+        dz, tangent_z = np.empty((2, *z.shape))
         dt, tangent_t, residual, determinant, ratio = np.empty((5, lanes))
         index = np.empty(lanes, dtype=np.int64)
         outputs = (dz, dt, tangent_z, tangent_t, residual, index, determinant, ratio)
         over_lanes(kernel, shared, inputs, outputs)
         determinant *= self.determinant_sign
-        out = Advance(*outputs[:-1])
+        return Advance(*outputs[:-1]), ratio
+
+    def pivot_steps(self, out: Advance, ratio: Values, *given: np.ndarray) -> Advance:
+        """Steps, those with an unsafe pivot by the general solve."""
         if not ratio.min(initial=1.0) >= PIVOT_GUARD:
             unsafe = ~(ratio >= PIVOT_GUARD)
-            again = super().advance(*(x[unsafe] for x in inputs))
+            again = super().advance(*(x[unsafe] for x in given))
             for name, column in vars(again).items():
                 getattr(out, name)[unsafe] = column
         return out

@@ -7,7 +7,17 @@ import numpy as np
 
 from equimorph.linalg.compiled import njit
 from equimorph.linalg.kernels import INNER
-from equimorph.linalg.simd import absolute, load, load2, repeat2, spread, stack2, store, where_less
+from equimorph.linalg.simd import (
+    LANES,
+    absolute,
+    load,
+    load2,
+    repeat2,
+    spread,
+    stack2,
+    store,
+    where_less,
+)
 from equimorph.structures.spatial.force_kernels import BORDER, COLUMN, FORCE, ROW
 from equimorph.structures.spatial.node_kernels import (
     COUNT,
@@ -103,6 +113,17 @@ def eliminate_vertex(v, last, border, left, vertices, ties, products, extremes):
             for c in range(a, border):
                 at = border * a + c
                 store(products, at, load(products, at) + factor * load(vertices, row + 3 + c))
+
+
+@njit(**INNER)
+def spring_vertices(springs, start, shares, vertices):
+    """Add the spring of each lane to its vertex."""
+    for lane in range(LANES):
+        v = int(springs[start + lane, 0])
+        for k in range(3):
+            for j in range(k, 3):
+                stiffness = springs[start + lane, 1 + k] * springs[start + lane, 1 + j]
+                vertices[(3 * v + k) * shares + j, lane] += stiffness
 
 
 @njit(**INNER)

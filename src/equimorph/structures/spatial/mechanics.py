@@ -230,7 +230,7 @@ class SpatialMechanics(SpatialLagrangian, JointEquations):
         x, (determinant, ratio) = np.empty(rhs.shape), np.empty((2, lanes))
         negative = np.empty(lanes, dtype=np.int64)
         outputs = [x, negative, determinant, ratio]
-        over_lanes(solve_bordered_lanes, self._step_tables, inputs, outputs)
+        over_lanes(solve_bordered_lanes, self.step_tables, inputs, outputs)
         negative -= 3 - self.constraints
         determinant *= self.determinant_sign
         return BorderedSolution(x, negative, ratio, ~(ratio >= PIVOT_GUARD), determinant)
@@ -272,7 +272,8 @@ class SpatialMechanics(SpatialLagrangian, JointEquations):
         return equation_tables(self.model, 0.5 * self.stiff_lengths)
 
     @cached_property
-    def _step_tables(self) -> tuple[np.ndarray, ...]:
+    def step_tables(self) -> tuple[np.ndarray, ...]:
+        """What the kernels of steps and solves share among lanes."""
         return step_tables(self.model, 0.5 * self.stiff_lengths)
 
     def advance(
@@ -282,7 +283,8 @@ class SpatialMechanics(SpatialLagrangian, JointEquations):
 
         One fused kernel; lanes with an unsafe pivot take the general solve.
         """
-        return self.fused_advance(advance_lanes, self._step_tables, z, p, dp, row, corner, defect)
+        given = z, p, dp, row, corner, defect, np.empty((len(z), 0))
+        return self.fused_advance(advance_lanes, self.step_tables, *given)
 
     @property
     def determinant_sign(self) -> float:

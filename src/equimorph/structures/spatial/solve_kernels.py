@@ -23,6 +23,7 @@ from equimorph.structures.spatial.chain_kernels import (
     eliminate_vertex,
     note_closures,
     note_pivot,
+    spring_vertices,
     to_vertices,
 )
 from equimorph.structures.spatial.element_kernels import assemble_element, reduce_rows
@@ -165,17 +166,6 @@ def join_system(axes, products, border, k, free, columns, rows, corner, rhs, sta
             else:
                 product = load(products, border * a + c + k)
             store(small, a * width + c, load(small, a * width + c) - product)
-
-
-@njit(**INNER)
-def spring_vertices(springs, start, shares, vertices):
-    """Add the spring of each lane to its vertex."""
-    for lane in range(LANES):
-        v = int(springs[start + lane, 0])
-        for k in range(3):
-            for j in range(k, 3):
-                stiffness = springs[start + lane, 1 + k] * springs[start + lane, 1 + j]
-                vertices[(3 * v + k) * shares + j, lane] += stiffness
 
 
 @njit(**INNER)

@@ -21,6 +21,7 @@ from equimorph.structures.spatial.chain_kernels import (
     restore_inner,
     restore_vertex,
     small_system,
+    spring_vertices,
     to_vertices,
 )
 from equimorph.structures.spatial.element_kernels import assemble_element, reduce_rows
@@ -103,13 +104,15 @@ def element_work(order, gradient):
 def advance_lanes(
     places, slopes, weights, stiff, moments, moment_picks, torsion, torsion_picks, forces,
     force_picks, tension, tension_picks, softness, turned, held, axes, closing_table, compliance,
-    lengths, z, p, dp, row, corner, defect,
+    lengths, z, p, dp, row, corner, defect, springs,
     dz, dt, tangent_z, tangent_t, residual, index, determinant, ratio,
 ):  # fmt: skip
     """Fused Newton step, tangent and inertia of a rod; see `structures.contract.Advance`.
 
     axes: number of the multiplier along x, y, z, or −1; moment rates are left out where nothing
-    but forces changes with parameters.
+    but forces changes with parameters. springs: none, or of each lane the number of a vertex v and
+    w, for a spring ``½ (w·φ_v)²`` that counts in F_z only. Entries of z behind the closures, and
+    those of the results, are passed over.
     """
     elements, order = slopes.shape[0], slopes.shape[1]
     degree, size, inner = order - 1, 3 * order, 3 * (order - 2)
@@ -180,6 +183,8 @@ def advance_lanes(
             to_vertices(e, inner, size, width, matrix, base, BORDER, vertices, ties)
         for v in range(begin, last + 1):
             complete_vertex(v, v * degree, radii, row_q, total, vertices)
+        if springs.shape[1] > 0:
+            spring_vertices(springs, start, SHARES, vertices)
         for v in range(begin, last + 1):
             eliminate_vertex(v, last, BORDER, BORDER, vertices, ties, products, extremes)
         hold_axes(axes, compliant)
