@@ -29,7 +29,7 @@ def test_the_arch_over_theta_and_load_has_two_sheets_aside_that_are_mirror_image
     rod = em.SpatialRod(torsion=0.77, lateral=1.0)
     assert "sideways mirror" in [each.name for each in rod.symmetries()]
     within, box = [rod.max_curvature <= 9.0], em.Box(Theta=(0.8, 1.0), q=(0.0, 3.0))
-    eset = em.equilibrium_set(rod, box, within=within, intervals=(2, 4), checks=0)
+    eset = em.equilibrium_set(rod, box, within=within, intervals=(2, 4))
     assert eset.audit.clean
     for load in (1.2, 1.8, 2.2):
         near = eset.at(Theta=0.9, q=load).stable
@@ -70,7 +70,7 @@ def test_a_round_rod_has_its_looping_folds_in_the_set_over_twist_and_span():
     """
     rod = em.SpatialRod(torsion=0.75, lateral=1.0, loads={}, span=0.95, phase=True)
     box, within = em.Box(twist_B=(8.5, 9.5), nu=(0.38, 0.5)), [rod.max_curvature <= 14.0]
-    eset = em.equilibrium_set(rod, box, within=within, intervals=(2, 2), checks=0)
+    eset = em.equilibrium_set(rod, box, within=within, intervals=(2, 2))
     assert eset.audit.clean
     folds = eset.points[eset.kinds == VertexKind.FOLD]
     start = em.lift(rod.natural_state(twist_B=9.0), {"nu": 0.6}).end.state
@@ -90,7 +90,7 @@ def test_a_set_over_angle_load_and_side_force_holds_what_lifts_reach():
     rod = em.SpatialRod("uniform", torsion=0.77, lateral=1.0, loads=across)
     box = em.Box(Theta=(0.85, 0.95), q=(1.2, 2.0), side=(0.01, 0.03))
     within = [rod.max_curvature <= 7.0]
-    eset = em.equilibrium_set(rod, box, within=within, intervals=(2, 2, 2), checks=0)
+    eset = em.equilibrium_set(rod, box, within=within, intervals=(2, 2, 2))
     assert eset.audit.clean
     for theta, load, side in ((0.9, 1.7, 0.02), (0.87, 1.3, 0.015), (0.93, 1.9, 0.026)):
         rest = rod.natural_state(Theta=theta)

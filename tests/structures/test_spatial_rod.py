@@ -6,6 +6,7 @@ from scipy.linalg import eigh, null_space
 from scipy.optimize import brentq
 
 import equimorph as em
+from equimorph.equilibria.settle import Guards, settle
 from equimorph.errors import InputError
 from equimorph.structures.discrete import correct_at_parameters
 from equimorph.structures.spatial.quaternions import (
@@ -423,3 +424,28 @@ def test_planar_rods_refuse_what_leaves_their_plane():
     ):
         with pytest.raises(InputError, match=text):
             em.Rod(loads=loads)
+
+
+@pytest.mark.slow
+def test_what_jumps_between_neighbouring_nodes_is_no_state_of_finer_elements():
+    """Hundreds of equilibria of 6 elements with quaternions that change their sign: of 20, none.
+
+    Others that are not resolved are found again, with their energy, where 20 are enough.
+    """
+    given = {"torsion": 0.77, "lateral": 1.3, "loads": {}, "coordinates": {}}
+    given |= {"curvature": 0.4, "side_curvature": 0.1}
+    rod, fine = em.SpatialRod(**given), em.SpatialRod(**given, elements=20)
+    rng, p = np.random.default_rng(5), np.tile(rod.natural_state(twist_B=5.0, nu=0.8).p, (3000, 1))
+    met = settle(rod, rod.sample(p, rng), p, guards=Guards(iterations=60))
+    z, p = met.z[met.found], p[met.found]
+    resolved, smooth = rod.resolved(z, p), rod.may_resolve(z, p)
+    assert smooth[resolved].all()
+    z, p, smooth = z[~resolved], p[~resolved], smooth[~resolved]
+    assert (~smooth).sum() > 200
+    guess = rod.mechanics.guess_for(fine.mechanics, z, p)
+    again, found = correct_at_parameters(fine, guess, p)
+    found &= fine.resolved(again, p)
+    assert not found[~smooth].any()
+    assert found.any()
+    here, there = rod.mechanics.energy(z, p)[found], fine.mechanics.energy(again, p)[found]
+    np.testing.assert_allclose(there, here, rtol=1e-3)

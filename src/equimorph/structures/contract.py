@@ -368,6 +368,11 @@ class Structure(Rebuilt, Equations):
         """Whether a finer discretisation resolves more; elsewhere `resolved` only bounds states."""
         return type(self).error_estimate is not Structure.error_estimate
 
+    def may_resolve(self, z: Lanes, p: Parameters) -> Flags:
+        """Whether finer discretisations may resolve states that this one does not."""
+        del p
+        return np.full(len(z), self.is_discretised)
+
     def missing_bound(self, within: Sequence[Constraint]) -> str:
         """Bound to add where there are equilibria without end within others; empty if none."""
         del within

@@ -172,6 +172,10 @@ class Pushed(Structure):
         """Whether the structure's discretisation represents states."""
         return self._base.resolved(z, self._own(p))
 
+    def may_resolve(self, z: Lanes, p: Parameters) -> Flags:
+        """Whether finer discretisations of the structure may resolve states."""
+        return self._base.may_resolve(z, self._own(p))
+
     def shape(
         self, z: Lanes, p: Parameters, s: Float[np.ndarray, " points"] | None = None
     ) -> Float[np.ndarray, "lanes points space"]:

@@ -97,8 +97,9 @@ def _missing(eset: EquilibriumSet, places: list[dict[str, float]], seed: int) ->
     dropped += [_within(pools, *each) for each in pools.unresolved]
     dropped.append(scattered[np.flatnonzero(~resolved)])
     coarse = join_states(structure, dropped)
-    coarse = coarse[np.flatnonzero(are_feasible(eset.constraints, coarse.z, coarse.p))]
-    left_out = _lacking(coarse, eset) if structure.is_discretised else ()
+    good = structure.may_resolve(coarse.z, coarse.p)
+    good &= are_feasible(eset.constraints, coarse.z, coarse.p)
+    left_out = _lacking(coarse[np.flatnonzero(good)], eset)
     return Check(len(found), lacking, led.outcomes, len(met), len(left_out))
 
 

@@ -17,7 +17,13 @@ from equimorph.structures.space_frame.kernels import linearise_lanes
 from equimorph.structures.space_frame.lagrangian import SpatialFrameLagrangian
 from equimorph.structures.space_frame.model import SpatialFrameModel
 from equimorph.structures.space_frame.network import Turning
-from equimorph.structures.spatial.quaternions import RIGHT, conjugate, exponential, product
+from equimorph.structures.spatial.quaternions import (
+    RIGHT,
+    are_near,
+    conjugate,
+    exponential,
+    product,
+)
 
 NONE = -1
 """Coordinate of an element, or entry, that there is none of."""
@@ -357,6 +363,10 @@ class SpatialFrameMechanics(SpatialFrameLagrangian, JointEquations):
         z = np.zeros((len(p), self.size))
         z[:, : self._rows : 4] = 1.0
         return z
+
+    def may_resolve(self, z: Lanes, p: Parameters) -> Flags:
+        """Whether rotations jump nowhere in an element: those that do are of the elements alone."""
+        return are_near(self.turns(z, p)[:, self.model.nodes])
 
     @cached_property
     def _tail(self) -> Float[np.ndarray, "2 order"]:

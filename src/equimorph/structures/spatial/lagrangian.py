@@ -21,6 +21,7 @@ from equimorph.structures.spatial.quaternions import (
     FRAME,
     RIGHT,
     Jet,
+    are_near,
     bilinear,
     clamp_rotation,
     exponential,
@@ -276,6 +277,10 @@ class SpatialLagrangian(RodMechanics):
     def resolved(self, z: Lanes, p: Parameters) -> Flags:
         """Whether the rotations are smooth in every element."""
         return np.asarray(self.tail(z, p) < LARGEST_TAIL)
+
+    def may_resolve(self, z: Lanes, p: Parameters) -> Flags:
+        """Whether rotations jump nowhere in an element."""
+        return are_near(self.rotations(z, p)[:, self.mesh.element_nodes])
 
     def symmetries(self) -> tuple[Symmetry, ...]:
         """Mirror images and half turns that leave the Lagrangian as it is."""

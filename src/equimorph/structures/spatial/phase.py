@@ -184,6 +184,10 @@ class PinnedMechanics(SpatialMechanics):
         """Whether the rotations are smooth, and the phase condition exerts no force."""
         return np.asarray(super().resolved(z, p) & (np.abs(z[:, -1]) < NO_FORCE))
 
+    def may_resolve(self, z: Lanes, p: Parameters) -> Flags:
+        """Whether rotations jump nowhere, and the phase condition exerts no force."""
+        return np.asarray(super().may_resolve(z, p) & (np.abs(z[:, -1]) < NO_FORCE))
+
     def turn(self, z: Lanes, angle: Values) -> Lanes:
         """States turned about the axis by angles, with the forces of the supports."""
         cosine, sine = np.cos(angle)[:, None], np.sin(angle)[:, None]

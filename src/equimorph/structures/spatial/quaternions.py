@@ -11,6 +11,7 @@ from collections.abc import Callable
 import numpy as np
 
 from equimorph.array_types import Float
+from equimorph.arrays import Flags
 
 Quaternions = Float[np.ndarray, "... 4"]
 Jet = Float[np.ndarray, "parts ..."]
@@ -76,6 +77,21 @@ def conjugate(q: Quaternions) -> Quaternions:
 def matrices(q: Quaternions) -> Float[np.ndarray, "... 3 3"]:
     """Rotation matrices, with the columns t, n, b."""
     return np.asarray(np.einsum("...a,kcab,...b->...ck", q, FRAME, q, optimize=True))
+
+
+SMALLEST_PRODUCT = 0.5
+"""Product of quaternions of neighbouring nodes, cos(φ/2), below which rotations jump."""
+
+
+def are_near(q: Float[np.ndarray, "lanes elements order 4"]) -> Flags:
+    """Whether neighbours in every element are turned by less than 120° against each other.
+
+    Quaternions q and −q are one rotation. Polynomials that lead from one to the other between
+    two nodes, through 0, or half of this way, are equilibria of elements of any size, since
+    strains are measured at the nodes; no rod has such states.
+    """
+    product_of_neighbours = (q[:, :, 1:] * q[:, :, :-1]).sum(axis=-1)
+    return np.asarray(product_of_neighbours.min(axis=(1, 2)) > SMALLEST_PRODUCT)
 
 
 # --- jets -----------------------------------------------------------------------------------------

@@ -287,6 +287,10 @@ class SpatialRod(DescribedInSpace):
             f"got {state!r}, near which this rod has no equilibrium."
         )
 
+    def may_resolve(self, z: Lanes, p: Parameters) -> Flags:
+        """Whether rotations jump nowhere: those that do are equilibria of the elements alone."""
+        return self.mechanics.may_resolve(z, p)
+
     def have_orbits(self, p: Parameters) -> Flags:
         """Whether states off the x axis may be turned about it for nothing."""
         rod = self.mechanics
