@@ -165,7 +165,7 @@ class PinnedMechanics(SpatialMechanics):
         step, ratio = self.bare.fused_step(advance_lanes, self.bare.step_tables, *given)
         for way, off in ((step.dz, gap), (step.tangent_z, 0.0)):
             way[:, -1] = 0.0
-            way -= (by * (_dot(own, way) + off))[:, None] * around
+            np.subtract(way, (by * (_dot(own, way) + off))[:, None] * around, out=way)
         step.dz[:, -1] -= z[:, -1]
         step.residual[:] = np.abs(residual).max(axis=1)
         scale = np.divide(rate, 2.0 * springs[:, 1], out=np.ones(len(z)), where=rate != 0.0)
