@@ -34,6 +34,9 @@ DRAWN = settings(max_examples=5, deadline=None, derandomize=True, database=None)
 every_structure = pytest.mark.parametrize("specimen", SPECIMENS, ids=lambda each: each.name)
 PINNED = "rod with a phase condition"
 """Its steps are those of the whole matrix at equilibria only: `test_orbits`."""
+every_whole_step = pytest.mark.parametrize(
+    "specimen", [each for each in SPECIMENS if each.name != PINNED], ids=lambda each: each.name
+)
 
 
 def drawn_states(test):
@@ -155,9 +158,7 @@ def test_second_derivative_is_bilinear_and_symmetric(specimen, seed):
     np.testing.assert_allclose(4 * mixed, square(1.0) - square(-1.0), atol=1e-12 * scale)
 
 
-@pytest.mark.parametrize(
-    "specimen", [each for each in SPECIMENS if each.name != PINNED], ids=lambda each: each.name
-)
+@every_whole_step
 def test_fused_step_equals_the_plain_route(specimen):
     """`Structure.advance` by the general bordered solve. 1e-10: conditioning of random states."""
     structure = specimen.structure
@@ -198,7 +199,7 @@ def test_linear_system_is_what_its_parts_are(specimen, k):
             np.testing.assert_allclose(found.x, exact.x, rtol=1e-9, atol=bound)
 
 
-@every_structure
+@every_whole_step
 def test_determinant_that_the_fused_step_tells_is_that_of_the_matrix(specimen):
     """Inverse by as many solves as columns; none told is none compared. 1e-8: the condition."""
     structure = specimen.structure
