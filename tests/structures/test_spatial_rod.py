@@ -15,7 +15,7 @@ from equimorph.structures.spatial.quaternions import (
     matrices,
     product,
 )
-from equimorph.study.structures import SpatialRodSection
+from equimorph.study.structures import SECTIONS
 from typecheck import unchecked
 
 LATERAL = 1.601471549048
@@ -365,7 +365,7 @@ def test_a_study_file_describes_the_same_rod():
         "actuators": {"push": {"term": "curvature", "about": "n"}},
         "side_curvature": [[0, 0], [1, 2]],
     }
-    section = SpatialRodSection.model_validate(table)
+    section = SECTIONS["spatial rod"].model_validate(table)
     made = em.structures.from_identity(section.model_dump(exclude_none=True))
     own = em.SpatialRod(
         section=em.Round("2 mm", E="70 GPa", nu=0.33), length="0.5 m",

@@ -183,6 +183,10 @@ def _keys_at(loc: tuple[int | str, ...], model: type[BaseModel]) -> list[str]:
     return list(node.get("properties", {}))
 
 
+INSIDE = {"$ref", "items", "additionalProperties"}
+"""Words of a schema for what has parts."""
+
+
 def _step(node: dict[str, Any], part: int | str, schema: dict[str, Any]) -> dict[str, Any]:
     """One part of a location further down in a JSON schema."""
     if isinstance(part, int):
@@ -192,7 +196,7 @@ def _step(node: dict[str, Any], part: int | str, schema: dict[str, Any]) -> dict
     else:
         inner = node.get("properties", {}).get(part) or node["additionalProperties"]
     for option in inner.get("anyOf", []):
-        inner = option if "$ref" in option or "items" in option else inner
+        inner = option if option.keys() & INSIDE else inner
     if "$ref" in inner:
         inner = schema["$defs"][inner["$ref"].rpartition("/")[2]]
     return dict(inner)

@@ -105,6 +105,28 @@ def _section(given: Any) -> Any:
     return given
 
 
+def _support(given: Any) -> Any:
+    table = given if isinstance(given, dict) else {}
+    fine = table and all(isinstance(value, str) or is_number(value) for value in table.values())
+    if not (isinstance(given, str) or fine):
+        raise requirement(
+            'be "fixed", "pinned", axes to hold like "y", or a table like '
+            '{ x = "held", angle = 2.0 }'
+        )
+    return given
+
+
+def _support_in_space(given: Any) -> Any:
+    table = given if isinstance(given, dict) else {}
+    fine = table and all(isinstance(x, str | list) or is_number(x) for x in table.values())
+    if not (isinstance(given, str) or fine):
+        raise requirement(
+            'be "fixed", "pinned", axes to hold like "xz", or a table like '
+            '{ line = [1, 0, 0], rotation = "held" }'
+        )
+    return given
+
+
 _NUMBER = {"type": "number", "minimum": -LARGEST, "maximum": LARGEST}
 _TEXT = {"type": "string"}
 _ROW = {"type": "array", "items": _NUMBER, "minItems": 2, "maxItems": 2}
@@ -137,3 +159,5 @@ Term = Annotated[Any, AfterValidator(_terms), WithJsonSchema(_ONE_OR_MORE_TERMS)
 CrossSection = Annotated[Any, AfterValidator(_section), WithJsonSchema(_SECTION)]
 EndOfRod = Annotated[Any, AfterValidator(_end), _end_form(ENDS, PLANAR_KEYS)]
 EndInSpace = Annotated[Any, AfterValidator(_end_in_space), _end_form(SPATIAL_ENDS, SPATIAL_KEYS)]
+Support = Annotated[Any, AfterValidator(_support)]
+SupportInSpace = Annotated[Any, AfterValidator(_support_in_space)]

@@ -17,7 +17,7 @@ from equimorph.study.extent import SetSection
 from equimorph.study.fields import Section
 from equimorph.study.kinds import KINDS
 from equimorph.study.question import Kind
-from equimorph.study.structures import StructureSection
+from equimorph.study.structures import SECTIONS
 
 TITLE = """\
 # Keys of study files
@@ -50,8 +50,7 @@ SHARED = {
 
 def reference() -> str:
     """Return the page as Markdown: each table with its tasks, keys, defaults and meanings."""
-    structures = sorted(StructureSection.__subclasses__(), key=_kind_of)
-    pages = [TITLE, *map(_of_structure, structures), _of_set()]
+    pages = [TITLE, *map(_of_structure, sorted(SECTIONS)), _of_set()]
     return "\n".join([*pages, *map(_of_kind, KINDS)])
 
 
@@ -76,14 +75,9 @@ def meanings(task: Callable[..., Any]) -> dict[str, str]:
     return {name: _first_sentence(words) for name, words in found.items()}
 
 
-def _kind_of(section: type[StructureSection]) -> str:
-    return str(get_args(section.model_fields["kind"].annotation)[0])
-
-
-def _of_structure(section: type[StructureSection]) -> str:
-    structure = STRUCTURES[_kind_of(section)]
-    title = f"[structure] of kind {_kind_of(section)}"
-    return _page(title, [structure], section, meanings(structure))
+def _of_structure(kind: str) -> str:
+    structure = STRUCTURES[kind]
+    return _page(f"[structure] of kind {kind}", [structure], SECTIONS[kind], meanings(structure))
 
 
 def _of_set() -> str:

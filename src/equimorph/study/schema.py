@@ -7,11 +7,10 @@ between several keys, or for names of a structure, is told by ``equimorph check`
 
 import json
 import sys
-from collections.abc import Callable, Mapping
-from typing import Any, get_args
+from collections.abc import Mapping
+from typing import Any
 
-from equimorph.model import Parameter
-from equimorph.structures import KINDS as STRUCTURES, Bar, Member, SpatialMember, Unknown
+from equimorph.structures import KINDS as STRUCTURES
 from equimorph.study.extent import PointSection, SetSection
 from equimorph.study.fields import Section
 from equimorph.study.kinds import KINDS
@@ -20,16 +19,13 @@ from equimorph.study.problem import STUDY
 from equimorph.study.reference import meanings, meanings_of_kind, meanings_of_set
 from equimorph.study.states import NaturalSection, StateSection
 from equimorph.study.structures import (
-    BarSection,
+    PARTS,
+    SECTIONS,
     DrawnForceSection,
     DrawnSupportSection,
     EffectSection,
-    MemberSection,
     ParameterSection,
     SpatialEffectSection,
-    SpatialMemberSection,
-    StructureSection,
-    UnknownSection,
 )
 
 TITLE = "equimorph study"
@@ -37,14 +33,6 @@ TITLE = "equimorph study"
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 UNUSED = ("title", "discriminator")
 """Words that pydantic writes and editors have no use for."""
-PARTS: Mapping[type[Section], Callable[..., Any]] = {
-    BarSection: Bar,
-    MemberSection: Member,
-    SpatialMemberSection: SpatialMember,
-    UnknownSection: Unknown,
-    ParameterSection: Parameter,
-}
-"""Classes whose docstrings say what the keys of parts of structures mean."""
 WORDS: Mapping[type[Section], Mapping[str, str]] = {
     STUDY: {
         "title": "Title of the page.",
@@ -130,8 +118,7 @@ def _told() -> dict[type[Section], Mapping[str, str]]:
     told |= {SetSection: meanings_of_set()}
     for kind in KINDS:
         told[kind.section] = {"name": "Names of its files begin with it."} | meanings_of_kind(kind)
-    for section in StructureSection.__subclasses__():
-        (word,) = get_args(section.model_fields["kind"].annotation)
+    for word, section in SECTIONS.items():
         told[section] = {"kind": "Kind of structure."} | meanings(STRUCTURES[word])
     for keyed, words in WORDS.items():
         told[keyed] = {**told.get(keyed, {}), **words}

@@ -1,10 +1,18 @@
-"""Structures of a study file."""
+"""Structures of a study file: their keys are the arguments of the structures.
 
+Defaults follow from the signature of each structure, or part of one; tables say in which form the
+value of each key is written.
+"""
+
+import inspect
+from collections.abc import Callable, Mapping
 from typing import Annotated, Any, Literal, Union
 
-from pydantic import AfterValidator, Field, field_validator
+from pydantic import Field, ValidationInfo, create_model, field_validator
 
-from equimorph.study.fields import LARGEST, Interval, Number, Section, is_number, requirement
+from equimorph.model import Parameter
+from equimorph.structures import KINDS, Bar, Member, SpatialMember, Unknown
+from equimorph.study.fields import Interval, Number, Positive, Section, is_number, requirement
 from equimorph.study.forms import (
     CrossSection,
     EndInSpace,
@@ -14,111 +22,62 @@ from equimorph.study.forms import (
     Profile,
     Quantity,
     Stiffness,
+    Support,
+    SupportInSpace,
     Term,
     UnitSystem,
 )
 
-
-class StructureSection(Section):
-    """A structure; its `kind` is a key of `equimorph.structures.KINDS`."""
-
-    kind: str
+Forms = Mapping[str, Any]
+"""Form of the value of each key; with its default, where that is not the one of the signature."""
+EMPTY = inspect.Parameter.empty
 
 
-class RodSection(StructureSection):
-    """A planar rod: by default a curved one between two rotary actuators; see `equimorph.Rod`."""
-
-    kind: Literal["rod"]
-    load: LoadShape | None = None
-    ends: Annotated[list[EndOfRod], Field(min_length=2, max_length=2)] | None = None
-    stiffness: Profile | None = None
-    curvature: Profile | None = None
-    axial: Profile | None = None
-    loads: dict[str, Term] | None = None
-    actuators: dict[str, Term] | None = None
-    coordinates: dict[str, dict[str, Number]] | None = None
-    rise: Quantity | None = None
-    EI: Quantity | None = None
-    length: Quantity | None = None
-    units: UnitSystem | None = None
-    torsion: Profile | None = None
-    lateral: Profile | None = None
-    section: CrossSection | None = None
-    mass: Stiffness | None = None
-    span: Stiffness | None = None
-    elements: int | None = Field(default=None, ge=2, le=1000)
-    degree: int | None = Field(default=None, ge=3, le=16)
-
-    @field_validator("span")
-    @classmethod
-    def _within_reach(cls, span: Any, info: Any) -> Any:
-        longest = info.data.get("length") or 1.0
-        texts = isinstance(span, str) or isinstance(longest, str)
-        if span is not None and not texts and info.data.get("axial") is None and not span < longest:
-            raise requirement(f"be less than {longest:g}")
-        return span
+def keys_of(made: Callable[..., Any], forms: Forms) -> dict[str, Any]:
+    """Form and default of each key; a default that is no number, text or flag is left out."""
+    keys: dict[str, Any] = {}
+    for key, form in forms.items():
+        default = inspect.signature(made).parameters[key].default
+        plain = isinstance(default, str | bool) or is_number(default)
+        if isinstance(form, tuple):
+            keys[key] = form
+        elif default is EMPTY or plain:
+            keys[key] = (form, ... if default is EMPTY else default)
+        else:
+            keys[key] = (form | None, None)
+    return keys
 
 
-class SpatialRodSection(StructureSection):
-    """A rod in space; see `equimorph.SpatialRod`."""
-
-    kind: Literal["spatial rod"]
-    load: LoadShape | None = None
-    torsion: Profile | None = None
-    lateral: Profile | None = None
-    section: CrossSection | None = None
-    ends: Annotated[list[EndInSpace], Field(min_length=2, max_length=2)] | None = None
-    stiffness: Profile | None = None
-    curvature: Profile | None = None
-    side_curvature: Profile | None = None
-    natural_twist: Profile | None = None
-    axial: Profile | None = None
-    shear: Profile | None = None
-    loads: dict[str, Term] | None = None
-    actuators: dict[str, Term] | None = None
-    coordinates: dict[str, dict[str, Number]] | None = None
-    span: Quantity | None = None
-    rise: Quantity | None = None
-    sideways: Quantity | None = None
-    phase: bool | None = None
-    EI: Quantity | None = None
-    length: Quantity | None = None
-    units: UnitSystem | None = None
-    mass: Stiffness | None = None
-    elements: int | None = Field(default=None, ge=2, le=1000)
-    degree: int | None = Field(default=None, ge=3, le=16)
+PARTS: dict[type[Section], Callable[..., Any]] = {}
+"""Sections of parts of structures, and what is made from them."""
 
 
-class SpringSection(StructureSection):
-    """The constrained spring."""
-
-    kind: Literal["spring"]
-    stiffness: float = Field(default=1.0, gt=0, le=LARGEST)
-    mass: float = Field(default=1.0, gt=0, le=LARGEST)
-
-
-class UnknownSection(Section):
-    """An unknown of an energy; see `equimorph.Unknown`."""
-
-    name: str
-    natural: Formula = 0.0
-    guesses: Interval | None = None
-    lower: Number | None = None
-    upper: Number | None = None
-    mass: float = Field(default=1.0, gt=0, le=LARGEST)
-    unit: str = "1"
+def part_of(made: Callable[..., Any], forms: Forms) -> Any:
+    """Section of a part of a structure."""
+    name, keys = f"{made.__name__}Section", keys_of(made, forms)
+    section: type[Section] = create_model(name, __base__=Section, __doc__=words_of(made), **keys)
+    PARTS[section] = made
+    return section
 
 
-class ParameterSection(Section):
-    """A parameter of an energy; see `equimorph.Parameter`."""
+def words_of(made: Callable[..., Any]) -> str:
+    """First line of a docstring."""
+    return (inspect.getdoc(made) or "").splitlines()[0]
 
-    name: str
-    unit: str = "1"
-    scale: float = Field(default=1.0, gt=0, le=LARGEST)
-    role: Literal["actuator", "load", "fixed"] = "actuator"
-    default: Number | None = None
-    lower: Number | None = None
-    upper: Number | None = None
+
+def many(form: Any, least: int = 1, most: int | None = None) -> Any:
+    """A list."""
+    return Annotated[list[form], Field(min_length=least, max_length=most)]
+
+
+def named(form: Any, least: int = 0) -> Any:
+    """Values by name."""
+    return Annotated[dict[str, form], Field(min_length=least)] if least else dict[str, form]
+
+
+Vector = Annotated[list[Number], Field(min_length=2, max_length=3)]
+InPlane = Annotated[list[Number], Field(min_length=2, max_length=2)]
+InSpace = Annotated[list[Number], Field(min_length=3, max_length=3)]
 
 
 class DrawnSupportSection(Section):
@@ -136,161 +95,141 @@ class DrawnForceSection(Section):
     force: list[Formula] = Field(min_length=2, max_length=2)
 
 
-class EnergySection(StructureSection):
-    """A structure given by its energy; see `equimorph.EnergyStructure`."""
-
-    kind: Literal["energy"]
-    energy: Formula
-    unknowns: list[UnknownSection] = Field(min_length=1)
-    parameters: list[ParameterSection]
-    constraints: list[Formula] = Field(default_factory=list)
-    definitions: dict[str, Formula] = Field(default_factory=dict)
-    descriptors: dict[str, Formula] = Field(default_factory=dict)
-    draw: list[Annotated[list[Formula], Field(min_length=2, max_length=2)]] = Field(
-        default_factory=list
-    )
-    mass: list[Formula | list[Formula]] = Field(default_factory=list)
-    supports: list[DrawnSupportSection] = Field(default_factory=list)
-    forces: list[DrawnForceSection] = Field(default_factory=list)
-
-
-class BarSection(Section):
-    """A bar of a truss; see `equimorph.Bar`."""
-
-    ends: list[str] = Field(min_length=2, max_length=2)
-    EA: Stiffness = 1.0
-    EI: Stiffness | None = None
-    rest: Stiffness | None = None
-    mass: Stiffness | None = None
-
-
-Vector = Annotated[list[Number], Field(min_length=2, max_length=3)]
-Place = Annotated[list[Quantity], Field(min_length=2, max_length=3)]
-
-
-class TrussSection(StructureSection):
-    """Bars between joints; see `equimorph.Truss`."""
-
-    kind: Literal["truss"]
-    joints: dict[str, Place] = Field(min_length=2)
-    bars: list[BarSection] = Field(min_length=1)
-    supports: dict[str, str]
-    loads: dict[str, dict[str, Vector]] = Field(default_factory=dict)
-    actuators: dict[str, dict[str, Number]] = Field(default_factory=dict)
-    strain: Literal["engineering", "green"] = "engineering"
-    masses: dict[str, Stiffness] = Field(default_factory=dict)
-    units: UnitSystem | None = None
-
-
-def _support(given: Any) -> Any:
-    table = given if isinstance(given, dict) else {}
-    fine = table and all(isinstance(value, str) or is_number(value) for value in table.values())
-    if not (isinstance(given, str) or fine):
-        raise requirement(
-            'be "fixed", "pinned", axes to hold like "y", or a table like '
-            '{ x = "held", angle = 2.0 }'
-        )
-    return given
-
-
-class MemberSection(Section):
-    """A member of a frame; see `equimorph.Member`."""
-
-    ends: list[str] = Field(min_length=2, max_length=2)
-    EI: Stiffness = 1.0
-    EA: Stiffness | None = None
-    curvature: Quantity = 0.0
-    hinges: list[str] = Field(default_factory=list)
-    weight: Stiffness | None = None
-    mass: Stiffness | None = None
-
-
-Plane = Annotated[list[Number], Field(min_length=2, max_length=2)]
-
-
 class EffectSection(Section):
     """What an actuator of a frame does, per unit of its parameter."""
 
     curvature: dict[str, Number] | None = None
     length: dict[str, Number] | None = None
-    move: dict[str, Plane] | None = None
+    move: dict[str, InPlane] | None = None
     turn: dict[str, Number] | None = None
-
-
-class FrameSection(StructureSection):
-    """Rods between joints; see `equimorph.Frame`."""
-
-    kind: Literal["frame"]
-    joints: dict[str, Annotated[list[Quantity], Field(min_length=2, max_length=2)]] = Field(
-        min_length=2
-    )
-    members: list[MemberSection] = Field(min_length=1)
-    supports: dict[str, Annotated[Any, AfterValidator(_support)]]
-    loads: dict[str, dict[str, Vector]] = Field(default_factory=dict)
-    actuators: dict[str, EffectSection] = Field(default_factory=dict)
-    elements: int = Field(default=2, ge=1, le=1000)
-    degree: int = Field(default=8, ge=3, le=16)
-    units: UnitSystem | None = None
-
-
-Space = Annotated[list[Number], Field(min_length=3, max_length=3)]
-PlaceInSpace = Annotated[list[Quantity], Field(min_length=3, max_length=3)]
-
-
-class SpatialMemberSection(Section):
-    """A member of a frame in space; see `equimorph.SpatialMember`."""
-
-    joints: list[str] = Field(min_length=2)
-    section: CrossSection | None = None
-    EI: Stiffness | None = None
-    EI_out: Stiffness | None = None
-    GJ: Stiffness | None = None
-    EA: Stiffness | None = None
-    inextensible: bool = False
-    normal: Space | None = None
-    curvature: Quantity = 0.0
-    strains: PlaceInSpace | None = None
-    length: Stiffness | None = None
-    hinges: list[str] | dict[str, Literal["ball"] | Space] = Field(default_factory=list)
-    weight: Stiffness | None = None
 
 
 class SpatialEffectSection(Section):
     """What an actuator of a frame in space does, per unit of its parameter."""
 
-    curvature: dict[str, Space] | None = None
+    curvature: dict[str, InSpace] | None = None
     length: dict[str, Number] | None = None
-    move: dict[str, Space] | None = None
-    turn: dict[str, Space] | None = None
+    move: dict[str, InSpace] | None = None
+    turn: dict[str, InSpace] | None = None
 
 
-def _support_in_space(given: Any) -> Any:
-    table = given if isinstance(given, dict) else {}
-    fine = table and all(isinstance(x, str | list) or is_number(x) for x in table.values())
-    if not (isinstance(given, str) or fine):
-        raise requirement(
-            'be "fixed", "pinned", axes to hold like "xz", or a table like '
-            '{ line = [1, 0, 0], rotation = "held" }'
-        )
-    return given
+NAMES = many(str, 2, 2)
+BarSection = part_of(Bar, {"ends": NAMES, **dict.fromkeys(("EA", "EI", "rest", "mass"), Stiffness)})
+MemberSection = part_of(
+    Member,
+    {
+        "ends": NAMES,
+        **dict.fromkeys(("EI", "EA", "weight", "mass"), Stiffness),
+        **{"section": CrossSection, "inextensible": bool, "curvature": Quantity},
+        "hinges": (list[str], Field(default_factory=list)),
+    },
+)
+SpatialMemberSection = part_of(
+    SpatialMember,
+    {
+        **{"joints": many(str, 2), "section": CrossSection, "inextensible": bool},
+        **dict.fromkeys(("EI", "EI_out", "GJ", "EA", "length", "weight", "mass"), Stiffness),
+        **{"normal": InSpace, "curvature": Quantity, "strains": many(Quantity, 3, 3)},
+        "hinges": (
+            list[str] | dict[str, Literal["ball"] | InSpace], Field(default_factory=list),
+        ),
+    },
+)  # fmt: skip
+LIMITS = {"lower": (Number | None, None), "upper": (Number | None, None)}
+UnknownSection = part_of(
+    Unknown,
+    {"name": str, "natural": Formula, "guesses": Interval, **LIMITS, "mass": Positive, "unit": str},
+)
+ParameterSection = part_of(
+    Parameter,
+    {
+        **{"name": str, "unit": (str, "1"), "scale": (Positive, 1.0), "default": Number, **LIMITS},
+        "role": (Literal["actuator", "load", "fixed"], "actuator"),
+    },
+)
+
+RESOLUTION = {
+    "elements": Annotated[int, Field(ge=1, le=1000)],
+    "degree": Annotated[int, Field(ge=3, le=16)],
+    "units": UnitSystem,
+}
+ROD = {
+    "load": LoadShape,
+    **dict.fromkeys(("stiffness", "curvature", "axial", "torsion", "lateral"), Profile),
+    **dict.fromkeys(("loads", "actuators"), named(Term)),
+    "coordinates": named(named(Number)),
+    **dict.fromkeys(("rise", "EI", "length"), Quantity),
+    **{"section": CrossSection, "mass": Stiffness, **RESOLUTION},
+    "elements": Annotated[int, Field(ge=2, le=1000)],
+}
+FORMS: Mapping[str, Forms] = {
+    "rod": {**ROD, "ends": many(EndOfRod, 2, 2), "span": Stiffness},
+    "spatial rod": {
+        **ROD,
+        "ends": many(EndInSpace, 2, 2),
+        **dict.fromkeys(("side_curvature", "natural_twist", "shear"), Profile),
+        **{"span": Quantity, "sideways": Quantity, "phase": bool},
+    },
+    "spring": {"stiffness": Positive, "mass": Positive},
+    "energy": {
+        **{
+            "energy": Formula,
+            "unknowns": many(UnknownSection),
+            "parameters": many(ParameterSection, 0),
+        },
+        **{"constraints": list[Formula], "draw": many(many(Formula, 2, 2), 0)},
+        **dict.fromkeys(("definitions", "descriptors"), named(Formula)),
+        "mass": list[Formula | list[Formula]],
+        **{"supports": list[DrawnSupportSection], "forces": list[DrawnForceSection]},
+        "coercive": bool,
+    },
+    "truss": {
+        **{"joints": named(many(Quantity, 2, 3), 2), "bars": many(BarSection)},
+        **{"supports": named(str), "loads": named(named(Vector))},
+        **{"actuators": named(named(Number)), "masses": named(Stiffness), "units": UnitSystem},
+        "strain": Literal["engineering", "green"],
+    },
+    "frame": {
+        **{"joints": named(many(Quantity, 2, 2), 2), "members": many(MemberSection)},
+        **{"supports": named(Support), "loads": named(named(Vector))},
+        **{"actuators": named(EffectSection), **RESOLUTION},
+    },
+    "spatial frame": {
+        **{"joints": named(many(Quantity, 3, 3), 2), "members": many(SpatialMemberSection)},
+        **{"supports": named(SupportInSpace), "loads": named(named(InSpace))},
+        **{"actuators": named(SpatialEffectSection), **RESOLUTION},
+    },
+}
+"""Forms of the arguments of each kind of structure."""
 
 
-class SpatialFrameSection(StructureSection):
-    """Rods between joints in space; see `equimorph.SpatialFrame`."""
+class StructureSection(Section):
+    """A structure; its `kind` is a key of `equimorph.structures.KINDS`."""
 
-    kind: Literal["spatial frame"]
-    joints: dict[str, PlaceInSpace] = Field(min_length=2)
-    members: list[SpatialMemberSection] = Field(min_length=1)
-    supports: dict[str, Annotated[Any, AfterValidator(_support_in_space)]]
-    loads: dict[str, dict[str, Space]] = Field(default_factory=dict)
-    actuators: dict[str, SpatialEffectSection] = Field(default_factory=dict)
-    elements: int = Field(default=2, ge=1, le=1000)
-    degree: int = Field(default=6, ge=3, le=16)
-    units: UnitSystem | None = None
+    kind: str
 
 
-ANY_STRUCTURE: Any = Annotated[
-    Union[tuple(StructureSection.__subclasses__())],  # noqa: UP007  # of the classes above
-    Field(discriminator="kind"),
-]
-"""Sections of all structures, distinguished by their kinds."""
+def _check_reach(span: Any, info: ValidationInfo) -> Any:
+    """Refuse a span that is as long as an inextensible rod."""
+    longest = info.data.get("length") or 1.0
+    texts = isinstance(span, str) or isinstance(longest, str)
+    if span is not None and not texts and info.data.get("axial") is None and not span < longest:
+        raise requirement(f"be less than {longest:g}")
+    return span
+
+
+def section_of(kind: str) -> type[StructureSection]:
+    """Section of a kind of structure."""
+    made = KINDS[kind]
+    name, doc = made.__name__.removesuffix("Structure"), words_of(made)
+    keys: dict[str, Any] = {"kind": (Literal[kind], ...), **keys_of(made, FORMS[kind])}
+    hooks: Any = {"_within_reach": field_validator("span")(_check_reach)} if kind == "rod" else {}
+    section: type[StructureSection] = create_model(
+        f"{name}Section", __base__=StructureSection, __doc__=doc, __validators__=hooks, **keys
+    )
+    return section
+
+
+SECTIONS = {kind: section_of(kind) for kind in KINDS}
+"""Sections of all structures by their kinds."""
+ANY_STRUCTURE: Any = Annotated[Union[tuple(SECTIONS.values())], Field(discriminator="kind")]  # noqa: UP007  # of these
