@@ -1,11 +1,19 @@
-"""Array shapes that appear throughout the package; the batch axis is `lanes`.
+"""Array types, and array shapes that appear throughout the package; the batch axis is `lanes`.
 
 Aliases for shapes that only one module uses stay in that module.
 """
 
 import numpy as np
 
-from equimorph.array_types import Bool, Float, Int
+from equimorph.array_types import (
+    Bool as Bool,
+    Float as Float,
+    Int as Int,
+    Num as Num,
+    Shaped as Shaped,
+    UInt8 as UInt8,
+    UInt16 as UInt16,
+)
 
 # one row for each lane of a batch
 Lanes = Float[np.ndarray, "lanes size"]

@@ -5,8 +5,7 @@ from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 
-from equimorph.array_types import Bool, Int
-from equimorph.arrays import Some
+from equimorph.arrays import Bool, Int, Some
 
 Record = TypeVar("Record", bound="Columns")
 

@@ -10,7 +10,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from equimorph.array_types import Shaped
+from equimorph.arrays import Shaped
 from equimorph.optional_packages import load_package
 
 Column = Shaped[np.ndarray, " rows"] | Sequence[object]

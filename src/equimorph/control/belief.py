@@ -6,7 +6,7 @@ from enum import StrEnum
 
 import numpy as np
 
-from equimorph.array_types import Float
+from equimorph.arrays import Float
 from equimorph.structures import State
 
 Loads = Float[np.ndarray, " k"]

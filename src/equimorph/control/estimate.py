@@ -11,8 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import chdtrc
 
-from equimorph.array_types import Float
-from equimorph.arrays import Values
+from equimorph.arrays import Float, Values
 from equimorph.control.belief import Covariance, Loads
 from equimorph.control.likely import Places, moved
 from equimorph.equilibria import Guards, settle

@@ -5,8 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from equimorph.array_types import Float, Int
-from equimorph.arrays import Flags, Parameters, Some, Values
+from equimorph.arrays import Flags, Float, Int, Parameters, Some, Values
 from equimorph.equilibria.soft_modes import metric_length
 from equimorph.model import position
 from equimorph.structures import States, Structure, join_states

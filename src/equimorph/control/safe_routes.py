@@ -5,8 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from equimorph.array_types import Int
-from equimorph.arrays import Values
+from equimorph.arrays import Int, Values
 from equimorph.control.likely import REACH, Bundles, LikelyLoads, moved, positions
 from equimorph.equilibria import TraceOptions
 from equimorph.manifold import EquilibriumSet, equilibrium_set

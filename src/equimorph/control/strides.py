@@ -8,8 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from equimorph.array_types import Float
-from equimorph.arrays import Values
+from equimorph.arrays import Float, Values
 from equimorph.control.likely import Bundles, LikelyLoads, Places, moved
 from equimorph.model import Box, Descriptor
 from equimorph.structures import State, States, join_states

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import eigh, null_space
 
-from equimorph.array_types import Float
+from equimorph.arrays import Float
 from equimorph.dynamics.mechanism import Mechanism, Pulls, Settings, Vector
 
 NEWTON_STEPS = 40

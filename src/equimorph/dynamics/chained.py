@@ -4,7 +4,7 @@ from abc import ABC, abstractmethod
 
 import numpy as np
 
-from equimorph.array_types import Float
+from equimorph.arrays import Float
 from equimorph.dynamics.linkage import Linkage
 from equimorph.dynamics.mechanism import Mechanism, Vector
 from equimorph.dynamics.plant import LinkagePlant, Simulation

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from equimorph.array_types import Float
+from equimorph.arrays import Float
 from equimorph.dynamics.direct import DirectModel
 from equimorph.dynamics.linkage import Linkage
 from equimorph.dynamics.mechanism import Settings

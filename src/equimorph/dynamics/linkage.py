@@ -9,7 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
-from equimorph.array_types import Bool, Float, Int
+from equimorph.arrays import Bool, Float, Int
 from equimorph.dynamics.mechanism import LIGHT, Mechanism, Pulls, Settings, Vector
 
 

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from equimorph.array_types import Float
+from equimorph.arrays import Float
 from equimorph.dynamics.balance import Balance, Quasistatics, balance, follow
 from equimorph.dynamics.chained import Chained
 from equimorph.dynamics.fold_delay import fold_delay

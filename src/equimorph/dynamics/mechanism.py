@@ -5,7 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
-from equimorph.array_types import Bool, Float
+from equimorph.arrays import Bool, Float
 
 Vector = Float[np.ndarray, " entries"]
 Pulls = Float[np.ndarray, " pulls"]

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from equimorph.array_types import Float
+from equimorph.arrays import Float
 from equimorph.dynamics.fold_delay import FoldDelay
 from equimorph.equilibria import settle, snap_landing
 from equimorph.errors import InputError

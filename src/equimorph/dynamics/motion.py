@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from equimorph.array_types import Float
+from equimorph.arrays import Float
 from equimorph.dynamics.model import Model, Row
 from equimorph.equilibria import check_start, way_points
 from equimorph.errors import InputError

@@ -5,8 +5,7 @@ from enum import IntEnum
 
 import numpy as np
 
-from equimorph.array_types import Int
-from equimorph.arrays import Flags, Lanes, Parameters, Values, Velocity
+from equimorph.arrays import Flags, Int, Lanes, Parameters, Values, Velocity
 from equimorph.columns import Columns
 from equimorph.dynamics.own import Motion
 from equimorph.equilibria import EnergyBarrier, lift, snap_landing

@@ -5,8 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
-from equimorph.array_types import Bool, Float
-from equimorph.arrays import Flags, Lanes, Parameters, Values, Velocity
+from equimorph.arrays import Bool, Flags, Float, Lanes, Parameters, Values, Velocity
 from equimorph.columns import Columns
 from equimorph.dynamics.direct import DirectModel, DirectPlant
 from equimorph.dynamics.model import Plant, Row

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from equimorph.array_types import Bool, Float, Int
+from equimorph.arrays import Bool, Float, Int
 from equimorph.dynamics.linkage import Linkage
 from equimorph.dynamics.mechanism import Mechanism, Settings, Vector
 from equimorph.dynamics.tree import WORLD, tree_of

@@ -9,7 +9,7 @@ import numpy as np
 from equimorph.argument_checks import check_arguments
 from equimorph.argument_kinds import one_of
 from equimorph.argument_vocabulary import POSITIVE
-from equimorph.array_types import Float
+from equimorph.arrays import Float
 from equimorph.dynamics.model import Course, Model, Plant, landing
 from equimorph.dynamics.motion import TimedCorners, equilibria_along, timed_corners
 from equimorph.dynamics.simulators import model_of

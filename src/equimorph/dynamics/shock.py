@@ -10,8 +10,7 @@ from typing import Literal
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
-from equimorph.array_types import Float
-from equimorph.arrays import Flags, Values
+from equimorph.arrays import Flags, Float, Values
 from equimorph.dynamics.outcomes import Clock, Launches, Outcome, least_force, play, relax
 from equimorph.dynamics.own import Motion, OwnModel
 from equimorph.dynamics.replay import ReplaySettings

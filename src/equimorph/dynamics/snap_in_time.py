@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
-from equimorph.array_types import Float
+from equimorph.arrays import Float
 from equimorph.dynamics.model import Model, landing
 from equimorph.dynamics.motion import TimedCorners, timed_corners
 from equimorph.dynamics.replay import STILL, ReplaySettings, Simulator

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from equimorph.array_types import Float, Int
+from equimorph.arrays import Float, Int
 from equimorph.dynamics.chained import Chained
 from equimorph.dynamics.mechanism import LIGHT, Settings, Vector
 from equimorph.dynamics.plant import Simulation

@@ -5,7 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
-from equimorph.array_types import Float, Int
+from equimorph.arrays import Float, Int
 from equimorph.dynamics.linkage import Linkage
 from equimorph.dynamics.mechanism import Vector
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from equimorph.array_types import Float
+from equimorph.arrays import Float
 from equimorph.dynamics.tree import WORLD, Tree
 
 Rests = Float[np.ndarray, "2 settings"]

@@ -6,8 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
-from equimorph.array_types import Float
-from equimorph.arrays import Lanes, Parameters, Values
+from equimorph.arrays import Float, Lanes, Parameters, Values
 from equimorph.equilibria.curves import AlongCurve, Curve, along_parameters
 from equimorph.structures import Equations, LinearSystem
 

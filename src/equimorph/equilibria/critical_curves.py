@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
-from equimorph.array_types import Float, Int
-from equimorph.arrays import Values
+from equimorph.arrays import Float, Int, Values
 from equimorph.equilibria.critical import normal_form
 from equimorph.equilibria.critical_tests import (
     bound,

@@ -4,8 +4,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from equimorph.array_types import Int
-from equimorph.arrays import Lanes, Parameters, Values
+from equimorph.arrays import Int, Lanes, Parameters, Values
 from equimorph.equilibria.critical import Critical, Test
 from equimorph.equilibria.lift import check_start
 from equimorph.equilibria.locus_events import Watch

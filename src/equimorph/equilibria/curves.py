@@ -6,8 +6,7 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 
-from equimorph.array_types import Float
-from equimorph.arrays import Lanes, Numbers, Parameters, Some, Values
+from equimorph.arrays import Float, Lanes, Numbers, Parameters, Some, Values
 from equimorph.equilibria.kernels import squared_lengths
 from equimorph.linalg import Border, BorderedSolution
 from equimorph.structures import Advance, Direction, Equations, LinearSystem, Structure

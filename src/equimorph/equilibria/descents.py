@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from equimorph.array_types import Float, Int
-from equimorph.arrays import Flags, Lanes, Parameters, Values
+from equimorph.arrays import Flags, Float, Int, Lanes, Parameters, Values
 from equimorph.equilibria.gradient_flow import (
     QUICK,
     Ending,

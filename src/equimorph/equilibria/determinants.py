@@ -5,8 +5,7 @@ It costs one factorisation, and says where an eigenvalue has to be looked at; se
 
 import numpy as np
 
-from equimorph.array_types import Bool, Float
-from equimorph.arrays import Lanes, Parameters, Some
+from equimorph.arrays import Bool, Float, Lanes, Parameters, Some
 from equimorph.equilibria.curves import Curve, ParameterLine
 from equimorph.equilibria.kernels import EARLY_DIP, EARLY_NEAR
 from equimorph.equilibria.locate import hermite

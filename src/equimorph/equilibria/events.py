@@ -4,8 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from equimorph.array_types import Bool, Float, Int
-from equimorph.arrays import Lanes, Numbers, Some, Values
+from equimorph.arrays import Bool, Float, Int, Lanes, Numbers, Some, Values
 from equimorph.columns import Columns
 from equimorph.equilibria.curves import Curve
 from equimorph.equilibria.locate import (

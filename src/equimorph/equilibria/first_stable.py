@@ -4,8 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from equimorph.array_types import Float, Shaped
-from equimorph.arrays import Flags, Lanes, Numbers, Parameters, Values
+from equimorph.arrays import Flags, Float, Lanes, Numbers, Parameters, Shaped, Values
 from equimorph.columns import Columns
 from equimorph.equilibria.critical import criticality
 from equimorph.equilibria.curves import ParameterLine

@@ -5,8 +5,7 @@ from enum import IntEnum
 
 import numpy as np
 
-from equimorph.array_types import Bool, Float, Int
-from equimorph.arrays import Flags, Lanes, Numbers, Parameters, Some, Values
+from equimorph.arrays import Bool, Flags, Float, Int, Lanes, Numbers, Parameters, Some, Values
 from equimorph.columns import Columns
 from equimorph.equilibria.settle import Guards, settle
 from equimorph.equilibria.soft_modes import extent_of_guesses, metric_length

@@ -8,8 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from equimorph.array_types import Float
-from equimorph.arrays import Flags, Lanes, Numbers, Parameters, Some, Values
+from equimorph.arrays import Flags, Float, Lanes, Numbers, Parameters, Some, Values
 from equimorph.equilibria.curves import Curve, dual
 from equimorph.equilibria.events import Events, locate_all
 from equimorph.equilibria.inside_steps import AT_EVENT, CLOSE, look_inside, probe_at, step_between

@@ -6,8 +6,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from equimorph.array_types import Float
-from equimorph.arrays import Flags, Lanes, Parameters, Some
+from equimorph.arrays import Flags, Float, Lanes, Parameters, Some
 from equimorph.equilibria.curves import Curve, ParameterLine
 from equimorph.equilibria.prescribed_curves import (
     Pieces,

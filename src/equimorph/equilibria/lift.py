@@ -7,8 +7,7 @@ from typing import overload
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
-from equimorph.array_types import Float, Int, Shaped
-from equimorph.arrays import Flags, Lanes, Numbers, Parameters, Some, Values
+from equimorph.arrays import Flags, Float, Int, Lanes, Numbers, Parameters, Shaped, Some, Values
 from equimorph.columns import Columns
 from equimorph.equilibria.critical import criticality
 from equimorph.equilibria.curves import Curve

@@ -7,8 +7,7 @@ from typing import overload
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
-from equimorph.array_types import Shaped
-from equimorph.arrays import Values
+from equimorph.arrays import Shaped, Values
 from equimorph.equilibria.legs import check_starts, violations
 from equimorph.equilibria.lift import Path, lift
 from equimorph.equilibria.trace_options import TraceOptions

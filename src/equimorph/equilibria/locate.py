@@ -12,8 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from equimorph.array_types import Float
-from equimorph.arrays import Flags, Lanes, Parameters, Some, Values
+from equimorph.arrays import Flags, Float, Lanes, Parameters, Some, Values
 from equimorph.equilibria import event_kernels as roots, kernels
 from equimorph.equilibria.critical import Critical, normal_form, null_border
 from equimorph.equilibria.curves import AlongCurve, Curve, along_parameters, dual, squared_length

@@ -5,8 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
-from equimorph.array_types import Float, Int
-from equimorph.arrays import Flags, Lanes, Numbers, Parameters, Values
+from equimorph.arrays import Flags, Float, Int, Lanes, Numbers, Parameters, Values
 from equimorph.columns import Columns
 from equimorph.equilibria.critical import Critical, Test, null_border
 from equimorph.equilibria.newton_step import Planes, Tangents

@@ -6,8 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import brentq
 
-from equimorph.array_types import Float
-from equimorph.arrays import Numbers, Values
+from equimorph.arrays import Float, Numbers, Values
 from equimorph.columns import Columns
 from equimorph.equilibria.critical import Test
 from equimorph.equilibria.locus import Locus, Points, Spots, advance, onto_set, test_slopes

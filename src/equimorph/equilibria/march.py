@@ -7,8 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from equimorph.array_types import Float
-from equimorph.arrays import Flags, Lanes, Numbers, Some, Values
+from equimorph.arrays import Flags, Float, Lanes, Numbers, Some, Values
 from equimorph.equilibria import kernels, step_kernels as stepping
 from equimorph.equilibria.curves import Curve, squared_length
 from equimorph.equilibria.events import Events, events_at

@@ -14,8 +14,7 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components, csgraph_from_dense, dijkstra
 
-from equimorph.array_types import Float, Int
-from equimorph.arrays import Items, Lanes
+from equimorph.arrays import Float, Int, Items, Lanes
 from equimorph.equilibria.descents import descend
 from equimorph.equilibria.gradient_flow import QUICK, Ending, Pace
 from equimorph.equilibria.random_search import PUSHED, Ground, Groups

@@ -5,8 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import ndimage
 
-from equimorph.array_types import Bool, Float, Int
-from equimorph.arrays import Flags, Lanes, Parameters, Settings
+from equimorph.arrays import Bool, Flags, Float, Int, Lanes, Parameters, Settings
 from equimorph.equilibria.settle import Guards, settle
 from equimorph.model import Grid, position
 from equimorph.structures import Structure

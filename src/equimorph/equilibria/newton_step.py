@@ -4,8 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from equimorph.array_types import Float, Int
-from equimorph.arrays import Flags, Lanes, Numbers, Parameters, Some, Values
+from equimorph.arrays import Flags, Float, Int, Lanes, Numbers, Parameters, Some, Values
 from equimorph.columns import Columns
 from equimorph.equilibria.critical import Critical, null_border
 from equimorph.equilibria.newton_kernels import amount_lanes, move_lanes, null_lanes

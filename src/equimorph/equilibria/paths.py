@@ -5,8 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from equimorph.array_types import Float, Int
-from equimorph.arrays import Lanes, Some, Values
+from equimorph.arrays import Float, Int, Lanes, Some, Values
 from equimorph.equilibria.critical import criticality
 from equimorph.equilibria.curves import Curve, ParameterLine
 from equimorph.equilibria.hidden_events import (

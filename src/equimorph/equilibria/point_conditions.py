@@ -12,8 +12,7 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 
-from equimorph.array_types import Float
-from equimorph.arrays import Lanes, Parameters, Scalars, Some
+from equimorph.arrays import Float, Lanes, Parameters, Scalars, Some
 from equimorph.columns import Columns
 from equimorph.equilibria.critical import Critical, Test
 from equimorph.model.descriptor import Evaluate

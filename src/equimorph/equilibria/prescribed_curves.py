@@ -8,8 +8,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.polynomial import chebyshev
 
-from equimorph.array_types import Float, Int
-from equimorph.arrays import Lanes, Numbers, Parameters, Some, Values
+from equimorph.arrays import Float, Int, Lanes, Numbers, Parameters, Some, Values
 from equimorph.equilibria.critical import Critical
 from equimorph.equilibria.curves import PlainCurve
 from equimorph.equilibria.point_conditions import Linear, Move, Values as DescriptorValues

@@ -4,8 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from equimorph.array_types import Float, Int
-from equimorph.arrays import Lanes, Numbers, Parameters, Values
+from equimorph.arrays import Float, Int, Lanes, Numbers, Parameters, Values
 from equimorph.equilibria.curves import ParameterLine, growing_force, newton_homotopy
 from equimorph.equilibria.saddles import Pairs, strongest_pushes
 from equimorph.equilibria.settle import Guards, settle

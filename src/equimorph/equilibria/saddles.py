@@ -8,8 +8,7 @@ from enum import IntEnum
 
 import numpy as np
 
-from equimorph.array_types import Int
-from equimorph.arrays import Lanes, Parameters, Some, Values
+from equimorph.arrays import Int, Lanes, Parameters, Some, Values
 from equimorph.columns import Columns
 from equimorph.equilibria.curves import growing_force
 from equimorph.equilibria.energy_barriers import Status

@@ -4,8 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from equimorph.array_types import Float, Int
-from equimorph.arrays import Lanes, Parameters
+from equimorph.arrays import Float, Int, Lanes, Parameters
 from equimorph.model import Descriptor
 from equimorph.structures import Structure
 

@@ -14,8 +14,7 @@ from enum import IntEnum
 
 import numpy as np
 
-from equimorph.array_types import Float, Int
-from equimorph.arrays import Flags, Lanes, Numbers, Parameters, Rows, Some, Values
+from equimorph.arrays import Flags, Float, Int, Lanes, Numbers, Parameters, Rows, Some, Values
 from equimorph.equilibria.newton_kernels import judge_lanes
 from equimorph.equilibria.newton_step import (
     Frame,

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
-from equimorph.array_types import Float
+from equimorph.arrays import Float
 from equimorph.equilibria.descents import descend
 from equimorph.equilibria.gradient_flow import FAITHFUL, Ending, Flow, gradient_flow, implicit_step
 from equimorph.equilibria.lift import check_start

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from equimorph.array_types import Float
-from equimorph.arrays import Flags, Lanes, Parameters, Values
+from equimorph.arrays import Flags, Float, Lanes, Parameters, Values
 from equimorph.columns import Columns
 from equimorph.linalg import multiply
 from equimorph.structures import Structure, stability_margin

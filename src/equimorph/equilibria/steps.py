@@ -4,8 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from equimorph.array_types import Float, Int
-from equimorph.arrays import Flags, Lanes, Numbers, Some, Values
+from equimorph.arrays import Flags, Float, Int, Lanes, Numbers, Some, Values
 from equimorph.columns import Columns
 from equimorph.equilibria import event_kernels, kernels
 from equimorph.equilibria.curves import AlongCurve, Curve, along_parameters, dual, squared_length

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
-from equimorph.array_types import Float
+from equimorph.arrays import Float
 from equimorph.equilibria.critical import NormalForm, normal_form
 from equimorph.equilibria.curves import ParameterLine, dual
 from equimorph.equilibria.lift import Path, check_start

@@ -11,8 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from equimorph.array_types import Bool
-from equimorph.arrays import Lanes, Numbers, Some, Values
+from equimorph.arrays import Bool, Lanes, Numbers, Some, Values
 from equimorph.equilibria.curves import Curve
 from equimorph.equilibria.events import Events, locate_all
 from equimorph.equilibria.inside_steps import inside_only_steps

@@ -6,7 +6,7 @@ from enum import IntEnum, StrEnum
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
-from equimorph.array_types import Float
+from equimorph.arrays import Float
 from equimorph.equilibria import kernels
 
 

@@ -11,8 +11,7 @@ from itertools import pairwise
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
-from equimorph.array_types import Int
-from equimorph.arrays import Flags, Values
+from equimorph.arrays import Flags, Int, Values
 from equimorph.equilibria.descents import NUDGES, descend
 from equimorph.equilibria.energy_barriers import EnergyBarrier, EnergyPath, Merge
 from equimorph.equilibria.gradient_flow import FAITHFUL, SMOOTH

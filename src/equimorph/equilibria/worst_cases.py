@@ -9,8 +9,7 @@ from typing import Literal
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
-from equimorph.array_types import Float
-from equimorph.arrays import Flags, Lanes, Parameters, Values
+from equimorph.arrays import Flags, Float, Lanes, Parameters, Values
 from equimorph.equilibria.curves import ParameterLine
 from equimorph.equilibria.settle import Guards, settle
 from equimorph.equilibria.trace import trace

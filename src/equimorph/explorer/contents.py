@@ -13,8 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from equimorph.array_types import Int, Num
-from equimorph.arrays import Values
+from equimorph.arrays import Int, Num, Values
 from equimorph.charts import Reduction
 from equimorph.errors import InputError
 from equimorph.explorer.pictures import FIDELITY, gallery, quantise, size_of

@@ -15,8 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from equimorph.array_types import Float, Num, UInt16
-from equimorph.arrays import Values
+from equimorph.arrays import Float, Num, UInt16, Values
 from equimorph.model import Couples, Drawing, Forces
 from equimorph.structures import States
 

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from equimorph.array_types import Float, Int
+from equimorph.arrays import Float, Int
 from equimorph.errors import InputError
 from equimorph.optional_packages import load_package
 

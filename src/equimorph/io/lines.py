@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 
 from equimorph.argument_checks import check_arguments
 from equimorph.argument_kinds import one_of
-from equimorph.array_types import Float, Int
+from equimorph.arrays import Float, Int
 from equimorph.errors import InputError
 from equimorph.io.formats import Drawing, read_compas, read_dxf, read_ply, read_vtk
 from equimorph.model.units import LENGTH, UNITS

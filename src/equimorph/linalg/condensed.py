@@ -5,8 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
-from equimorph.array_types import Float, Int
-from equimorph.arrays import Flags, Numbers, Values
+from equimorph.arrays import Flags, Float, Int, Numbers, Values
 from equimorph.errors import InputError
 from equimorph.linalg.bordered_kernels import solve_condensed
 from equimorph.linalg.dense import BorderedSolution, solve_bordered

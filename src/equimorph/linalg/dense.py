@@ -4,8 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from equimorph.array_types import Float
-from equimorph.arrays import Flags, Lanes, Numbers, Values
+from equimorph.arrays import Flags, Float, Lanes, Numbers, Values
 from equimorph.linalg.kernels import count_negative, multiply_lanes, orthonormal_lanes
 
 Border = tuple[

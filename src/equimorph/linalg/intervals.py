@@ -12,7 +12,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from equimorph.array_types import Float
+from equimorph.arrays import Float
 
 Array = Float[np.ndarray, "*shape"]
 

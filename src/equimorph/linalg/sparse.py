@@ -6,7 +6,7 @@ from heapq import heappop, heappush
 
 import numpy as np
 
-from equimorph.array_types import Float, Int
+from equimorph.arrays import Float, Int
 from equimorph.linalg.dense import Border, BorderedSolution, no_border, solve_bordered
 from equimorph.linalg.lanes import over_lanes
 from equimorph.linalg.sparse_kernels import solve_sparse

@@ -11,8 +11,7 @@ from equimorph.argument_checks import check_arguments
 from equimorph.argument_kinds import is_number
 from equimorph.argument_notes import QUANTITY
 from equimorph.argument_vocabulary import LARGEST
-from equimorph.array_types import Float
-from equimorph.arrays import Flags, Lanes, Parameters, Values
+from equimorph.arrays import Flags, Float, Lanes, Parameters, Values
 from equimorph.errors import InputError
 from equimorph.model.obstacle import Obstacle
 from equimorph.model.rebuilding import Rebuilt, remember_call

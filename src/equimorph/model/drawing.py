@@ -8,8 +8,7 @@ from enum import StrEnum
 
 import numpy as np
 
-from equimorph.array_types import Float
-from equimorph.arrays import Values
+from equimorph.arrays import Float, Values
 
 Spots = Float[np.ndarray, "lanes space"]
 """One place or direction for each state."""

@@ -24,7 +24,7 @@ from typing import Any, Protocol, TypeAlias, TypeVar, runtime_checkable
 
 import numpy as np
 
-from equimorph.array_types import Shaped
+from equimorph.arrays import Shaped
 from equimorph.columns import Columns
 from equimorph.errors import InputError
 from equimorph.model.descriptor import Descriptor

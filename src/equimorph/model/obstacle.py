@@ -8,7 +8,7 @@ import numpy as np
 
 from equimorph.argument_checks import check_arguments
 from equimorph.argument_notes import DIRECTION, PAIR
-from equimorph.array_types import Float
+from equimorph.arrays import Float
 
 Pair = Annotated[Sequence[float], PAIR]
 Places = Float[np.ndarray, "*points axes"]

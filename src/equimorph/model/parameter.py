@@ -12,8 +12,7 @@ from equimorph.argument_checks import check_arguments
 from equimorph.argument_kinds import is_number
 from equimorph.argument_notes import BOUNDS, DIVIDED
 from equimorph.argument_vocabulary import FINITE, PERIOD, POSITIVE
-from equimorph.array_types import Float
-from equimorph.arrays import Place
+from equimorph.arrays import Float, Place
 from equimorph.errors import InputError, suggestion
 
 Samples = Float[np.ndarray, "knots *lanes"]

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.interpolate import BPoly
 
 from equimorph.argument_checks import check_arguments
-from equimorph.array_types import Bool, Float, Int
+from equimorph.arrays import Bool, Float, Int
 from equimorph.errors import InputError, MissingError
 from equimorph.tables import Table, Tabular
 

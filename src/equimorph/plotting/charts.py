@@ -11,7 +11,7 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
 from equimorph.argument_checks import check_arguments
-from equimorph.array_types import Float
+from equimorph.arrays import Float
 from equimorph.charts import Atlas, Chart, Domain, Edge, Reduction
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet

@@ -11,7 +11,7 @@ from matplotlib.patches import PathPatch
 from scipy import ndimage
 from scipy.spatial import cKDTree
 
-from equimorph.array_types import Float
+from equimorph.arrays import Float
 from equimorph.charts.regions import Regions, empty_regions
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Constraint

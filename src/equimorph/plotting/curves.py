@@ -4,7 +4,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from equimorph.array_types import Bool, Float, Int, Shaped
+from equimorph.arrays import Bool, Float, Int, Shaped
 from equimorph.equilibria import Path, settle
 from equimorph.errors import InputError
 from equimorph.manifold import Division, EquilibriumSet

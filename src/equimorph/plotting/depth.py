@@ -12,7 +12,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from mpl_toolkits.mplot3d import proj3d
 
-from equimorph.array_types import Bool, Float, Int
+from equimorph.arrays import Bool, Float, Int
 from equimorph.model import Actuator, Drawing, Forces, Support
 from equimorph.plotting import style
 from equimorph.plotting.raster_kernels import nearest

@@ -14,8 +14,7 @@ from matplotlib.text import Text
 from PIL import Image
 
 from equimorph.argument_checks import check_arguments
-from equimorph.array_types import Float
-from equimorph.arrays import Values
+from equimorph.arrays import Float, Values
 from equimorph.charts.regions import count_equilibria
 from equimorph.equilibria import EnergyPath, Path
 from equimorph.manifold import EquilibriumSet

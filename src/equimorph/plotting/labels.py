@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.contour import ContourSet
 from matplotlib.transforms import Affine2D, Transform
 
-from equimorph.array_types import Float
+from equimorph.arrays import Float
 from equimorph.model import Constraint, Descriptor, position
 from equimorph.plotting import style
 from equimorph.structures import Structure

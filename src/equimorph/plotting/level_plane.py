@@ -11,7 +11,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from equimorph.argument_checks import check_arguments
-from equimorph.array_types import Float
+from equimorph.arrays import Float
 from equimorph.manifold import EquilibriumSet, Level, level_set
 from equimorph.model import Descriptor
 from equimorph.plotting import style

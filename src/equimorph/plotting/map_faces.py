@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from equimorph.array_types import Bool, Float, Int
+from equimorph.arrays import Bool, Float, Int
 
 Axis = Float[np.ndarray, " _"]
 

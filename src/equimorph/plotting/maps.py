@@ -15,7 +15,7 @@ from matplotlib.ticker import MaxNLocator
 from matplotlib.tri import Triangulation
 
 from equimorph.argument_checks import check_arguments
-from equimorph.array_types import Bool, Float
+from equimorph.arrays import Bool, Float
 from equimorph.model.descriptor import CONSTRAINT
 from equimorph.plotting import style
 from equimorph.plotting.labels import (

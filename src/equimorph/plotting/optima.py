@@ -13,7 +13,7 @@ from matplotlib.patches import Patch, Rectangle
 from mpl_toolkits.axes_grid1 import make_axes_locatable
 
 from equimorph.argument_checks import check_arguments
-from equimorph.array_types import Float
+from equimorph.arrays import Float
 from equimorph.manifold.geometry.topology import chains
 from equimorph.model import Descriptor
 from equimorph.plotting import style

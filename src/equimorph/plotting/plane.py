@@ -9,7 +9,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.lines import Line2D
 
 from equimorph.argument_checks import check_arguments
-from equimorph.array_types import Float, Int
+from equimorph.arrays import Float, Int
 from equimorph.charts.regions import count_equilibria
 from equimorph.equilibria import Path
 from equimorph.errors import InputError

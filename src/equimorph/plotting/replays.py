@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from equimorph.argument_checks import check_arguments
-from equimorph.array_types import Float
+from equimorph.arrays import Float
 from equimorph.dynamics import Replay
 from equimorph.plotting import style
 from equimorph.plotting.depth import viewpoint_of

@@ -19,7 +19,7 @@ from matplotlib.image import AxesImage
 from matplotlib.transforms import IdentityTransform
 from scipy import ndimage
 
-from equimorph.array_types import Bool, Float, UInt8
+from equimorph.arrays import Bool, Float, UInt8
 from equimorph.plotting import style
 from equimorph.plotting.depth import DepthBuffer, View, Viewpoint, depth_buffer, view_of
 from equimorph.plotting.shading import Paint, paint

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from equimorph.array_types import Bool, Float, Int
+from equimorph.arrays import Bool, Float, Int
 from equimorph.plotting.depth import DepthBuffer, View, slopes
 from equimorph.plotting.raster_kernels import edges_of_depth, paint_pixels
 

@@ -11,7 +11,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from equimorph.argument_checks import check_arguments
-from equimorph.array_types import Float
+from equimorph.arrays import Float
 from equimorph.charts.regions import count_equilibria
 from equimorph.errors import InputError
 from equimorph.manifold import Snap, SnapGraph

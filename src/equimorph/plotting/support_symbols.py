@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from equimorph.array_types import Float
+from equimorph.arrays import Float
 from equimorph.model import SupportKind
 
 Outline = Float[np.ndarray, "points 2"]

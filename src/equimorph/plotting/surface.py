@@ -10,7 +10,7 @@ from matplotlib.patches import Patch
 from mpl_toolkits.mplot3d import Axes3D, proj3d
 
 from equimorph.argument_checks import check_arguments
-from equimorph.array_types import Bool, Float, Int
+from equimorph.arrays import Bool, Float, Int
 from equimorph.equilibria import Path
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet, divided_by

@@ -16,7 +16,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Polygon
 from matplotlib.patheffects import AbstractPathEffect, Stroke as Casing
 
-from equimorph.array_types import Float
+from equimorph.arrays import Float
 from equimorph.model import ActuatorKind, Constraint, Drawing, Obstacle, Support, SupportKind
 from equimorph.plotting import style
 from equimorph.plotting.depth import Viewpoint, draw_triad, viewpoint_of

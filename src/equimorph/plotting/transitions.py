@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import Normalize
 
 from equimorph.argument_checks import check_arguments
-from equimorph.array_types import Float
+from equimorph.arrays import Float
 from equimorph.equilibria import EnergyPath, TransitionNetwork
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet, NetworkChanges

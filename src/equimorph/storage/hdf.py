@@ -18,7 +18,7 @@ from typing import Any
 import h5py
 import numpy as np
 
-from equimorph.array_types import Shaped
+from equimorph.arrays import Shaped
 from equimorph.errors import InputError
 from equimorph.linalg.lanes import in_background
 from equimorph.storage.files import replacing

@@ -7,7 +7,7 @@ import h5py
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
-from equimorph.array_types import Float, Int
+from equimorph.arrays import Float, Int
 from equimorph.model import Grid
 from equimorph.storage.files import write_csv
 from equimorph.storage.hdf import get, get_json, put, put_coordinate, put_json, put_parameters

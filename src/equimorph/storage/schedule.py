@@ -21,7 +21,7 @@ import h5py
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
-from equimorph.array_types import Float
+from equimorph.arrays import Float
 from equimorph.equilibria import Event, Path as StatePath
 from equimorph.errors import InputError
 from equimorph.model import Schedule

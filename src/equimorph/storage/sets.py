@@ -11,7 +11,7 @@ from typing import Any
 import h5py
 import numpy as np
 
-from equimorph.array_types import Float, Int
+from equimorph.arrays import Float, Int
 from equimorph.errors import InputError
 from equimorph.manifold import Boundary, BoundaryKind, EquilibriumSet
 from equimorph.manifold.complex.base_mesh import BaseMesh

@@ -12,7 +12,7 @@ from typing import Any, get_args
 import h5py
 import numpy as np
 
-from equimorph.array_types import Shaped
+from equimorph.arrays import Shaped
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Box, Constraint, Descriptor, Grid

@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
-from equimorph.array_types import Float, Int
-from equimorph.arrays import Lanes, Parameters, Values
+from equimorph.arrays import Float, Int, Lanes, Parameters, Values
 from equimorph.errors import InputError
 from equimorph.model import Descriptor, Parameter, position, remember_call
 from equimorph.model.parameter import Role

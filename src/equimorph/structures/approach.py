@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from equimorph.array_types import Float
-from equimorph.arrays import Values
+from equimorph.arrays import Float, Values
 from equimorph.model.obstacle import Obstacle
 
 STEPS = 8

@@ -14,8 +14,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
-from equimorph.array_types import Float, Int
-from equimorph.arrays import Flags, Lanes, Parameters, Values, Velocity
+from equimorph.arrays import Flags, Float, Int, Lanes, Parameters, Values, Velocity
 from equimorph.errors import InputError, MissingError, suggestion
 from equimorph.model import (
     Call,

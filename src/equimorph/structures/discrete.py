@@ -8,8 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
-from equimorph.array_types import Float
-from equimorph.arrays import Entries, Flags, Lanes, Parameters, Values
+from equimorph.arrays import Entries, Flags, Float, Lanes, Parameters, Values
 from equimorph.errors import InputError
 from equimorph.linalg.lanes import over_lanes
 from equimorph.linalg.sparse import SparseLayout

@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from equimorph.array_types import Float, Int
-from equimorph.arrays import Lanes, Parameters, Sides, Values
+from equimorph.arrays import Float, Int, Lanes, Parameters, Sides, Values
 from equimorph.linalg import Border, BorderedSolution
 from equimorph.linalg.intervals import Interval
 

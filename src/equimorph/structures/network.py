@@ -10,7 +10,7 @@ from typing import Annotated, Any, ClassVar, TypeVar
 import numpy as np
 
 from equimorph.argument_notes import NAME
-from equimorph.array_types import Float, Int
+from equimorph.arrays import Float, Int
 from equimorph.errors import InputError, suggestion
 from equimorph.structures.unit_system import Quantity, UnitSystem
 

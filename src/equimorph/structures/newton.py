@@ -11,8 +11,7 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 
-from equimorph.array_types import Float, Int
-from equimorph.arrays import Flags, Lanes, Parameters, Values
+from equimorph.arrays import Flags, Float, Int, Lanes, Parameters, Values
 from equimorph.linalg.simd import LANES
 from equimorph.structures import newton_kernels
 from equimorph.structures.equations import Advance

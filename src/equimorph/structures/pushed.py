@@ -5,8 +5,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from equimorph.array_types import Float
-from equimorph.arrays import Flags, Lanes, Parameters, Sides, Values, Velocity
+from equimorph.arrays import Flags, Float, Lanes, Parameters, Sides, Values, Velocity
 from equimorph.errors import InputError
 from equimorph.linalg import BorderedSolution, no_border, solve_bordered
 from equimorph.model import Descriptor, Parameter

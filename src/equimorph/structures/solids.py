@@ -9,7 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from equimorph.array_types import Float
+from equimorph.arrays import Float
 from equimorph.structures.states import States
 
 RADIUS = 0.012

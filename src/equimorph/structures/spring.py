@@ -7,8 +7,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
-from equimorph.array_types import Float
-from equimorph.arrays import Flags, Lanes, Parameters, Sides, Values
+from equimorph.arrays import Flags, Float, Lanes, Parameters, Sides, Values
 from equimorph.linalg import BorderedSolution, no_border, solve_bordered
 from equimorph.linalg.intervals import Interval, cosine, inverse, join, sine, square
 from equimorph.model import (

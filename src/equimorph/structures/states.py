@@ -9,8 +9,7 @@ from typing import Any, Protocol, overload, runtime_checkable
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
-from equimorph.array_types import Float, Int
-from equimorph.arrays import Flags, Lanes, Parameters, Values
+from equimorph.arrays import Flags, Float, Int, Lanes, Parameters, Values
 from equimorph.errors import InputError, MissingError
 from equimorph.model import Descriptor, Drawing, names_of, position
 from equimorph.structures.contract import Structure

@@ -9,8 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from equimorph.array_types import Float
-from equimorph.arrays import Lanes, Parameters, Velocity
+from equimorph.arrays import Float, Lanes, Parameters, Velocity
 from equimorph.errors import InputError
 from equimorph.structures.contract import Structure
 from equimorph.structures.equations import Equations

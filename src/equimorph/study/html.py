@@ -9,8 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from equimorph.array_types import Float
-from equimorph.arrays import Values
+from equimorph.arrays import Float, Values
 from equimorph.model import Box, Constraint, Descriptor
 from equimorph.plotting.depth import flat_shapes
 from equimorph.structures import States

@@ -18,7 +18,7 @@ import numpy as np
 from rich.text import Text
 
 from equimorph import plotting
-from equimorph.array_types import Int
+from equimorph.arrays import Int
 from equimorph.explorer import explore
 from equimorph.manifold import EquilibriumSet, SnapGraph
 from equimorph.model import Descriptor, Progress, Schedule, names_of

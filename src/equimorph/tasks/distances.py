@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from equimorph.array_types import Float, Int
-from equimorph.arrays import Values
+from equimorph.arrays import Float, Int, Values
 from equimorph.equilibria.settle import distances
 from equimorph.structures import State, States
 

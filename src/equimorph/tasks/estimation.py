@@ -8,8 +8,7 @@ import numpy as np
 from scipy.special import chdtrc
 
 from equimorph.argument_checks import check_arguments
-from equimorph.array_types import Float, Int
-from equimorph.arrays import Flags, Values
+from equimorph.arrays import Flags, Float, Int, Values
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.geometry.tangents import fold_slopes, split_step

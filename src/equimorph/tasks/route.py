@@ -6,7 +6,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from equimorph.array_types import Float
+from equimorph.arrays import Float
 from equimorph.equilibria import Event, Landing, Path, TraceOptions, lift, lift_legs
 from equimorph.errors import InputError
 from equimorph.model import Constraint, Descriptor, Schedule, names_of

@@ -4,7 +4,7 @@ from itertools import combinations_with_replacement
 
 import numpy as np
 
-from equimorph.array_types import Bool, Float, Int
+from equimorph.arrays import Bool, Float, Int
 from equimorph.manifold import EquilibriumSet, part, restricted
 from equimorph.manifold.complex.kept_sets import from_cache, kept
 from equimorph.manifold.geometry.setting import embed

@@ -12,8 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from equimorph.array_types import Float
-from equimorph.arrays import Frames, Lanes, Parameters, Rows, Values
+from equimorph.arrays import Float, Frames, Lanes, Parameters, Rows, Values
 from equimorph.equilibria.critical import Critical, null_border
 from equimorph.equilibria.settle import free_directions
 from equimorph.manifold.geometry.setting import Setting

@@ -12,8 +12,7 @@ from itertools import product
 
 import numpy as np
 
-from equimorph.array_types import Float
-from equimorph.arrays import Flags, Frames, Lanes, Numbers, Parameters, Rows, Values
+from equimorph.arrays import Flags, Float, Frames, Lanes, Numbers, Parameters, Rows, Values
 from equimorph.columns import Columns
 from equimorph.equilibria.critical import null_border
 from equimorph.equilibria.point_conditions import (

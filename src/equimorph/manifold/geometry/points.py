@@ -5,8 +5,7 @@ from enum import IntEnum
 
 import numpy as np
 
-from equimorph.array_types import Bool, Float, Int
-from equimorph.arrays import Some
+from equimorph.arrays import Bool, Float, Int, Some
 from equimorph.manifold.geometry.kernels import match_or_add
 from equimorph.structures import Structure
 from equimorph.tolerances import SAME_STATE

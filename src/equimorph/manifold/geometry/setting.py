@@ -4,8 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from equimorph.array_types import Float, Int
-from equimorph.arrays import Lanes, Parameters, Place
+from equimorph.arrays import Float, Int, Lanes, Parameters, Place
 from equimorph.model import Constraint
 from equimorph.structures import Structure
 

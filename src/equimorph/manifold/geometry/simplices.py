@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from equimorph.array_types import Float
-from equimorph.arrays import ItemValues, Place, Places
+from equimorph.arrays import Float, ItemValues, Place, Places
 
 
 def volumes(corners: Float[np.ndarray, "n corners d"]) -> ItemValues:

@@ -6,10 +6,10 @@ from itertools import combinations
 
 import numpy as np
 
-from equimorph.array_types import Float
 from equimorph.arrays import (
     CellNumbers,
     Cells,
+    Float,
     Frames,
     Items,
     Lanes,

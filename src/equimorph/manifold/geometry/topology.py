@@ -8,12 +8,14 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from equimorph.array_types import Bool, Float, Int
 from equimorph.arrays import (
+    Bool,
     CellFlags,
     CellNumbers,
     Cells,
     Facets,
+    Float,
+    Int,
     ItemFlags,
     Items,
     Pairs,

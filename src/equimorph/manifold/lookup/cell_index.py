@@ -4,8 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from equimorph.array_types import Bool, Float, Int
-from equimorph.arrays import Items, Place, Places
+from equimorph.arrays import Bool, Float, Int, Items, Place, Places
 from equimorph.columns import Columns
 from equimorph.manifold.geometry.simplices import volumes
 from equimorph.manifold.geometry.topology import Adjacency, keys_of

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.distance import cdist
 
-from equimorph.array_types import Bool, Float, Int
-from equimorph.arrays import Flags, Lanes, Numbers, Some
+from equimorph.arrays import Bool, Flags, Float, Int, Lanes, Numbers, Some
 from equimorph.equilibria import ParameterLine, TraceOptions
 from equimorph.equilibria.trace import trace
 from equimorph.equilibria.trace_options import EventCode

@@ -17,8 +17,18 @@ from functools import cached_property
 import numpy as np
 from numpy.polynomial import chebyshev, legendre
 
-from equimorph.array_types import Float, Int
-from equimorph.arrays import Cells, Facets, Flags, ItemValues, Lanes, Numbers, Places, Values
+from equimorph.arrays import (
+    Cells,
+    Facets,
+    Flags,
+    Float,
+    Int,
+    ItemValues,
+    Lanes,
+    Numbers,
+    Places,
+    Values,
+)
 from equimorph.columns import Columns
 from equimorph.equilibria.critical import Critical, null_border
 from equimorph.equilibria.newton_step import Planes

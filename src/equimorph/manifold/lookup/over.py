@@ -9,12 +9,14 @@ from functools import cached_property, partial
 
 import numpy as np
 
-from equimorph.array_types import Bool, Float, Int
 from equimorph.arrays import (
+    Bool,
     CellFlags,
     CellNumbers,
     Cells,
     Flags,
+    Float,
+    Int,
     Items,
     Lanes,
     Numbers,

@@ -8,8 +8,7 @@ from itertools import combinations
 
 import numpy as np
 
-from equimorph.array_types import Float, Int
-from equimorph.arrays import Flags, Lanes, Numbers, Parameters, Some
+from equimorph.arrays import Flags, Float, Int, Lanes, Numbers, Parameters, Some
 from equimorph.equilibria.descents import descend
 from equimorph.equilibria.gradient_flow import FAITHFUL, Ending
 from equimorph.equilibria.saddles import Nowhere

@@ -10,8 +10,18 @@ from functools import cached_property
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
-from equimorph.array_types import Bool, Float, Int
-from equimorph.arrays import Flags, ItemValues, Lanes, Numbers, Parameters, Some, Values
+from equimorph.arrays import (
+    Bool,
+    Flags,
+    Float,
+    Int,
+    ItemValues,
+    Lanes,
+    Numbers,
+    Parameters,
+    Some,
+    Values,
+)
 from equimorph.equilibria import EnergyBarrier
 from equimorph.equilibria.saddles import Nowhere, ways_over
 from equimorph.equilibria.snap import CRITICAL

@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
-from equimorph.array_types import Float, Int
+from equimorph.arrays import Float, Int
 from equimorph.errors import InputError
 from equimorph.manifold.complex.equilibrium_set import Component, EquilibriumSet
 from equimorph.manifold.queries.levels import cell_sizes, part, restricted

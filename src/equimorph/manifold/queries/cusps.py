@@ -5,8 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
-from equimorph.array_types import Float, Int
-from equimorph.arrays import CellFlags, Items, ItemValues, Pairs, VertexFlags
+from equimorph.arrays import CellFlags, Float, Int, Items, ItemValues, Pairs, VertexFlags
 from equimorph.equilibria.critical import Critical, null_border
 from equimorph.equilibria.locus import Locus, nearest
 from equimorph.equilibria.settle import lower_index

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from equimorph.array_types import Float
+from equimorph.arrays import Float
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.geometry.tangents import frames_in_embedding

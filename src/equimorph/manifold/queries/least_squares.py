@@ -10,8 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from equimorph.array_types import Bool, Float
-from equimorph.arrays import Flags, Lanes, Numbers, Parameters, Some, Values
+from equimorph.arrays import Bool, Flags, Float, Lanes, Numbers, Parameters, Some, Values
 from equimorph.columns import Columns
 from equimorph.manifold.geometry.setting import Setting
 from equimorph.manifold.geometry.tangents import cap_slopes, frames_in_embedding, split_step

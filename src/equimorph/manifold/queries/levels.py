@@ -6,8 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
-from equimorph.array_types import Float, Int
-from equimorph.arrays import CellFlags, CellNumbers, ItemFlags, Items, VertexFlags
+from equimorph.arrays import CellFlags, CellNumbers, Float, Int, ItemFlags, Items, VertexFlags
 from equimorph.errors import InputError
 from equimorph.manifold.complex.cuts import (
     ROUND_OFF,

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
-from equimorph.array_types import Float, Int
-from equimorph.arrays import Flags, Lanes, Parameters
+from equimorph.arrays import Flags, Float, Int, Lanes, Parameters
 from equimorph.errors import InputError
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.manifold.geometry.topology import faces_of

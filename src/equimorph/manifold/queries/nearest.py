@@ -4,8 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from equimorph.array_types import Float, Int
-from equimorph.arrays import Flags, Items, Lanes, Pairs, Parameters, Rows, Some
+from equimorph.arrays import Flags, Float, Int, Items, Lanes, Pairs, Parameters, Rows, Some
 from equimorph.columns import Columns
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.manifold.complex.kept_sets import kept

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
-from equimorph.array_types import Int
-from equimorph.arrays import Flags, Lanes, Parameters, Values
+from equimorph.arrays import Flags, Int, Lanes, Parameters, Values
 from equimorph.equilibria.soft_modes import metric_length
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.manifold.lookup.exact_states import StatesOver

@@ -7,8 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
-from equimorph.array_types import Int
-from equimorph.arrays import Facets, ItemFlags, Items
+from equimorph.arrays import Facets, Int, ItemFlags, Items
 from equimorph.equilibria import Landing, snap_landing
 from equimorph.errors import InputError
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet

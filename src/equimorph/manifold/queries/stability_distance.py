@@ -7,8 +7,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 
 from equimorph.argument_checks import check_arguments
-from equimorph.array_types import Float, Int
-from equimorph.arrays import Facets, Items, Lanes, Parameters, Some
+from equimorph.arrays import Facets, Float, Int, Items, Lanes, Parameters, Some
 from equimorph.equilibria import lift
 from equimorph.equilibria.critical import Critical, null_border
 from equimorph.errors import InputError

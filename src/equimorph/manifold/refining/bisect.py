@@ -11,8 +11,7 @@ from itertools import combinations
 
 import numpy as np
 
-from equimorph.array_types import Int
-from equimorph.arrays import EdgeFlags, Flags, ItemFlags, Items, Pairs, Values, VertexFlags
+from equimorph.arrays import EdgeFlags, Flags, Int, ItemFlags, Items, Pairs, Values, VertexFlags
 from equimorph.equilibria.critical import Critical, Test
 from equimorph.equilibria.critical_tests import gap
 from equimorph.equilibria.locus import Locus, Spots, nearest

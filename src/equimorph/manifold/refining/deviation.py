@@ -6,8 +6,7 @@ from functools import partial
 
 import numpy as np
 
-from equimorph.array_types import Float, Int
-from equimorph.arrays import EdgeFlags, Items, ItemValues, Pairs, VertexFlags
+from equimorph.arrays import EdgeFlags, Float, Int, Items, ItemValues, Pairs, VertexFlags
 from equimorph.linalg.lanes import results_of
 from equimorph.manifold.complex.edge_points import chunks
 from equimorph.manifold.complex.marked_complex import (

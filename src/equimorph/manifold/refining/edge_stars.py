@@ -12,8 +12,18 @@ from itertools import combinations
 
 import numpy as np
 
-from equimorph.array_types import Bool, Float, Int
-from equimorph.arrays import Cells, Edges, ItemFlags, Items, ItemValues, Pairs, VertexFlags
+from equimorph.arrays import (
+    Bool,
+    Cells,
+    Edges,
+    Float,
+    Int,
+    ItemFlags,
+    Items,
+    ItemValues,
+    Pairs,
+    VertexFlags,
+)
 from equimorph.columns import Columns
 from equimorph.manifold.complex.marked_complex import CURVES, Fabric, FacetMark, squared_sides
 from equimorph.manifold.complex.vertices import Vertices

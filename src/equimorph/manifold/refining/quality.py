@@ -14,8 +14,7 @@ from itertools import combinations
 
 import numpy as np
 
-from equimorph.array_types import Bool, Float, Int
-from equimorph.arrays import CellFlags, Cells, Items, VertexFlags
+from equimorph.arrays import Bool, CellFlags, Cells, Float, Int, Items, VertexFlags
 from equimorph.manifold.complex.marked_complex import (
     CURVES,
     TRIANGLES,

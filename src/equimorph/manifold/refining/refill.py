@@ -14,8 +14,7 @@ from functools import partial
 
 import numpy as np
 
-from equimorph.array_types import Bool, Float
-from equimorph.arrays import Edges, VertexFlags
+from equimorph.arrays import Bool, Edges, Float, VertexFlags
 from equimorph.manifold.complex.marked_complex import TETRAHEDRA, TRIANGLES, Fabric
 from equimorph.manifold.geometry.topology import among, keys_of, rows_of
 from equimorph.manifold.refining.deviation import Memory, deviations

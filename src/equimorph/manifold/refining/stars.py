@@ -6,8 +6,7 @@ from itertools import combinations
 
 import numpy as np
 
-from equimorph.array_types import Bool, Float, Int
-from equimorph.arrays import Cells, Edges, ItemFlags, Items
+from equimorph.arrays import Bool, Cells, Edges, Float, Int, ItemFlags, Items
 from equimorph.manifold.complex.marked_complex import TRIANGLES, Fabric, squared_sides
 from equimorph.manifold.geometry.topology import among, count_corners, distinct, keys_of
 from equimorph.manifold.refining.quality import POOR, qualities, smallest_angles, worst

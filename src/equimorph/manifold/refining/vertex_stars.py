@@ -10,8 +10,7 @@ from itertools import combinations, product
 
 import numpy as np
 
-from equimorph.array_types import Bool, Float, Int
-from equimorph.arrays import Edges, ItemFlags, Places, VertexFlags
+from equimorph.arrays import Bool, Edges, Float, Int, ItemFlags, Places, VertexFlags
 from equimorph.manifold.complex.edge_points import chunks, of_index, on_curves, vertices_at
 from equimorph.manifold.complex.marked_complex import (
     TRIANGLES,

@@ -8,7 +8,7 @@ import numpy as np
 
 from equimorph.argument_kinds import is_number, one_of, short
 from equimorph.argument_vocabulary import FINITE
-from equimorph.array_types import Bool, Float
+from equimorph.arrays import Bool, Float
 from equimorph.errors import InputError
 from equimorph.model import Drawing, Forces, Support, SupportKind
 from equimorph.structures.energy.expressions import POINT

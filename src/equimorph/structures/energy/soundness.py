@@ -11,8 +11,7 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from equimorph.array_types import Float, Int
-from equimorph.arrays import Entries, Lanes, Parameters, Values
+from equimorph.arrays import Entries, Float, Int, Lanes, Parameters, Values
 from equimorph.structures.energy.kernels import OPERATIONS
 from equimorph.structures.energy.tape import Tape
 

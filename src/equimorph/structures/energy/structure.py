@@ -8,8 +8,7 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
-from equimorph.array_types import Bool, Float
-from equimorph.arrays import Flags, Lanes, Parameters, Values
+from equimorph.arrays import Bool, Flags, Float, Lanes, Parameters, Values
 from equimorph.errors import InputError
 from equimorph.linalg.intervals import Interval, join
 from equimorph.linalg.sparse import SparseLayout

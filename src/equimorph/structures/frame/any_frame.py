@@ -8,8 +8,7 @@ from typing import Any, ClassVar, NamedTuple, NoReturn
 import numpy as np
 from numpy.polynomial import legendre
 
-from equimorph.array_types import Float
-from equimorph.arrays import Lanes, Parameters, Values, Velocity
+from equimorph.arrays import Float, Lanes, Parameters, Values, Velocity
 from equimorph.errors import InputError
 from equimorph.model import (
     Actuator,

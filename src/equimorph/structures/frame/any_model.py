@@ -9,7 +9,7 @@ from typing import Annotated, Any, ClassVar, TypeVar
 import numpy as np
 
 from equimorph.argument_kinds import is_listed, is_number, one_of
-from equimorph.array_types import Bool, Float, Int
+from equimorph.arrays import Bool, Float, Int
 from equimorph.errors import InputError
 from equimorph.model.units import STANDARD_GRAVITY
 from equimorph.structures.frame.member import Stiffness

@@ -5,8 +5,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from equimorph.array_types import Float
-from equimorph.arrays import Lanes, Parameters
+from equimorph.arrays import Float, Lanes, Parameters
 from equimorph.linalg.dense import multiply
 from equimorph.model import Support
 from equimorph.model.drawing import supports_of_point, unit_vectors

@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from equimorph.array_types import Bool, Float, Int
-from equimorph.arrays import Lanes, Parameters
+from equimorph.arrays import Bool, Float, Int, Lanes, Parameters
 from equimorph.linalg.dense import multiply
 from equimorph.structures.any_network import edges_of_image, images, is_symmetry, parameter_exchange
 from equimorph.structures.contract import Symmetry

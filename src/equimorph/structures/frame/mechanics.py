@@ -6,8 +6,18 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from equimorph.array_types import Bool, Float, Int
-from equimorph.arrays import Entries, Flags, Lanes, Nodal, Parameters, Scalars, Values
+from equimorph.arrays import (
+    Bool,
+    Entries,
+    Flags,
+    Float,
+    Int,
+    Lanes,
+    Nodal,
+    Parameters,
+    Scalars,
+    Values,
+)
 from equimorph.linalg.dense import multiply
 from equimorph.linalg.intervals import Interval
 from equimorph.linalg.sparse import SparseLayout

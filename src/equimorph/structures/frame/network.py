@@ -10,7 +10,7 @@ import numpy as np
 from equimorph.argument_checks import check_arguments
 from equimorph.argument_kinds import one_of
 from equimorph.argument_notes import TWO_NAMES, positive_quantity
-from equimorph.array_types import Bool, Float
+from equimorph.arrays import Bool, Float
 from equimorph.errors import InputError
 from equimorph.structures.frame.any_model import WEIGHT, AnyFrameNetwork
 from equimorph.structures.frame.member import AnyMember

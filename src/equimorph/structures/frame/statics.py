@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from equimorph.array_types import Bool, Float, Int
+from equimorph.arrays import Bool, Float, Int
 
 
 class Flows(NamedTuple):

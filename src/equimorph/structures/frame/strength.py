@@ -8,8 +8,7 @@ from abc import abstractmethod
 
 import numpy as np
 
-from equimorph.array_types import Float
-from equimorph.arrays import Lanes, Parameters, Values
+from equimorph.arrays import Float, Lanes, Parameters, Values
 from equimorph.errors import MissingError
 from equimorph.model import Descriptor, remember_call
 from equimorph.structures.any_network import AnyNetwork

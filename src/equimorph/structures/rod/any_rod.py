@@ -9,8 +9,7 @@ import numpy as np
 
 from equimorph.argument_checks import check_arguments
 from equimorph.argument_vocabulary import SHARE
-from equimorph.array_types import Float, Int
-from equimorph.arrays import Flags, Lanes, Parameters, Sides, Values
+from equimorph.arrays import Flags, Float, Int, Lanes, Parameters, Sides, Values
 from equimorph.errors import InputError
 from equimorph.linalg import BorderedSolution
 from equimorph.linalg.intervals import Interval

@@ -4,8 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from equimorph.array_types import Float
-from equimorph.arrays import Values
+from equimorph.arrays import Float, Values
 
 SAMPLES = 129
 """Arclengths at which distances are compared first."""

@@ -4,8 +4,7 @@ from functools import cached_property, partial
 
 import numpy as np
 
-from equimorph.array_types import Float
-from equimorph.arrays import Lanes, Nodal, Parameters, Sides, Values, Velocity
+from equimorph.arrays import Float, Lanes, Nodal, Parameters, Sides, Values, Velocity
 from equimorph.linalg import BorderedSolution, CondensedLayout, multiply, no_border
 from equimorph.linalg.lanes import over_lanes
 from equimorph.structures.contract import Symmetry

@@ -7,8 +7,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
-from equimorph.array_types import Int
-from equimorph.arrays import Lanes, Parameters, Values
+from equimorph.arrays import Int, Lanes, Parameters, Values
 from equimorph.errors import InputError, MissingError
 from equimorph.model import Constraint, Descriptor, remember_call
 from equimorph.model.descriptor import Branches

@@ -10,8 +10,7 @@ import numpy as np
 from numpy.polynomial import legendre
 
 from equimorph.argument_vocabulary import count
-from equimorph.array_types import Float, Int
-from equimorph.arrays import Lanes, Values
+from equimorph.arrays import Float, Int, Lanes, Values
 
 REFINING = 6
 """Newton iterations on a finer mesh, started from the interpolated state."""

@@ -4,8 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from equimorph.array_types import Float
-from equimorph.arrays import Lanes, Parameters, Values
+from equimorph.arrays import Float, Lanes, Parameters, Values
 from equimorph.model import Actuator, ActuatorKind, Couples, Drawing, Forces, Support as Symbol
 from equimorph.model.drawing import supports_of_point
 from equimorph.structures.rod.any_rod import AnyRod

@@ -10,7 +10,7 @@ import numpy as np
 from equimorph.argument_checks import check_arguments
 from equimorph.argument_kinds import one_of
 from equimorph.argument_vocabulary import POSITIVE
-from equimorph.array_types import Float
+from equimorph.arrays import Float
 from equimorph.errors import InputError
 
 Holding = Annotated[

@@ -5,8 +5,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.polynomial import legendre
 
-from equimorph.array_types import Float, Int
-from equimorph.arrays import Lanes, Parameters
+from equimorph.arrays import Float, Int, Lanes, Parameters
 from equimorph.structures.rod.discretisation import Mesh, reference_element
 from equimorph.structures.rod.mechanics import PlanarMechanics
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from equimorph.array_types import Float
+from equimorph.arrays import Float
 
 TERMS = 2.0 * np.arange(500) + 1.0
 """Odd numbers of the torsion series: what follows them in J is 1e-13 of the whole."""

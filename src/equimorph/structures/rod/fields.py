@@ -6,8 +6,7 @@ from functools import cached_property
 import numpy as np
 from numpy.polynomial import legendre, polynomial
 
-from equimorph.array_types import Float, Int
-from equimorph.arrays import Lanes, Parameters, Scalars, Values
+from equimorph.arrays import Float, Int, Lanes, Parameters, Scalars, Values
 from equimorph.linalg.lanes import over_lanes
 from equimorph.structures.rod import clamped_field_kernels, general_field_kernels
 from equimorph.structures.rod.discretisation import Mesh, Reference, reference_element

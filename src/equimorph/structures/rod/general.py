@@ -4,8 +4,17 @@ from functools import cached_property
 
 import numpy as np
 
-from equimorph.array_types import Float
-from equimorph.arrays import Flags, Lanes, Nodal, Parameters, Scalars, Sides, Values, Velocity
+from equimorph.arrays import (
+    Flags,
+    Float,
+    Lanes,
+    Nodal,
+    Parameters,
+    Scalars,
+    Sides,
+    Values,
+    Velocity,
+)
 from equimorph.linalg import BorderedSolution, CondensedLayout, no_border
 from equimorph.linalg.lanes import over_lanes
 from equimorph.linalg.sparse import SparseLayout

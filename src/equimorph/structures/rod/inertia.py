@@ -10,8 +10,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from equimorph.array_types import Float
-from equimorph.arrays import Lanes, Nodal, Parameters, Scalars, Velocity
+from equimorph.arrays import Float, Lanes, Nodal, Parameters, Scalars, Velocity
 from equimorph.model import Parameter
 from equimorph.structures.collapse import Shortening
 from equimorph.structures.rod.discretisation import Mesh

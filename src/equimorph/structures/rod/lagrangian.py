@@ -7,7 +7,7 @@ from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 
-from equimorph.array_types import Float
+from equimorph.arrays import Float
 from equimorph.structures.rod.discretisation import Mesh
 from equimorph.structures.rod.ends import FREE, Axis, compliance
 

@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from equimorph.array_types import Bool, Float, Int
-from equimorph.arrays import Lanes, Parameters, Values
+from equimorph.arrays import Bool, Float, Int, Lanes, Parameters, Values
 from equimorph.errors import InputError
 from equimorph.linalg import Border, BorderedSolution, no_border, solve_bordered
 from equimorph.linalg.condensed import REFINABLE

@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from equimorph.array_types import Float
-from equimorph.arrays import Lanes, Parameters, Values, Velocity
+from equimorph.arrays import Float, Lanes, Parameters, Values, Velocity
 from equimorph.structures.rod.any_rod import Arclengths
 from equimorph.structures.rod.centreline import Centreline
 from equimorph.structures.rod.mechanics import PlanarMechanics

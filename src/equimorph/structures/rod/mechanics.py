@@ -6,8 +6,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from equimorph.array_types import Float
-from equimorph.arrays import Flags, Lanes, Nodal, Parameters, Values, Velocity
+from equimorph.arrays import Flags, Float, Lanes, Nodal, Parameters, Values, Velocity
 from equimorph.errors import InputError
 from equimorph.linalg.condensed import PIVOT_GUARD
 from equimorph.linalg.intervals import Interval

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from equimorph.array_types import Bool, Float, Int
+from equimorph.arrays import Bool, Float, Int
 from equimorph.structures.rod.discretisation import Mesh, reference_element
 from equimorph.structures.rod.ends import FREE, HELD, Axis, End, support_axes
 from equimorph.structures.rod.lagrangian import (

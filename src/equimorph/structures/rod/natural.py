@@ -8,8 +8,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from numpy.polynomial import legendre
 
-from equimorph.array_types import Bool, Float, Int
-from equimorph.arrays import Flags, Lanes, Parameters, Values
+from equimorph.arrays import Bool, Flags, Float, Int, Lanes, Parameters, Values
 from equimorph.structures.newton import Limits, Steps, Through, newton
 from equimorph.structures.rod.discretisation import reference_element
 from equimorph.structures.rod.general import GeneralMechanics

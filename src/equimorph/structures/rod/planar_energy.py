@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from equimorph.array_types import Float, Int
+from equimorph.arrays import Float, Int
 from equimorph.linalg.intervals import Interval, cosine, join, product, sine, square, symmetric
 from equimorph.structures.equations import Enclosed
 from equimorph.structures.rod.pressure import EnclosedArea

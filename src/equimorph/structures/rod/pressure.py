@@ -6,8 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
-from equimorph.array_types import Float, Int
-from equimorph.arrays import Entries, Nodal, Values
+from equimorph.arrays import Entries, Float, Int, Nodal, Values
 from equimorph.linalg.dense import multiply
 from equimorph.structures.rod.discretisation import Mesh
 

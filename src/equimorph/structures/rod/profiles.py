@@ -7,7 +7,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from equimorph.argument_kinds import one_of
-from equimorph.array_types import Float
+from equimorph.arrays import Float
 from equimorph.errors import InputError
 from equimorph.structures.rod.discretisation import Mesh
 from equimorph.structures.unit_system import Quantity

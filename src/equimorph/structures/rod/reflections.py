@@ -11,8 +11,7 @@ from itertools import product
 
 import numpy as np
 
-from equimorph.array_types import Float
-from equimorph.arrays import Lanes, Parameters
+from equimorph.arrays import Float, Lanes, Parameters
 from equimorph.structures.contract import Symmetry
 from equimorph.structures.rod.lagrangian import RodLagrangian
 from equimorph.structures.rod.model import RodModel

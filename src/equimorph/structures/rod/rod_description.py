@@ -8,8 +8,7 @@ from typing import Any, ClassVar, Generic, Protocol, TypeVar
 
 import numpy as np
 
-from equimorph.array_types import Float
-from equimorph.arrays import Parameters, Values
+from equimorph.arrays import Float, Parameters, Values
 from equimorph.errors import InputError, suggestion
 from equimorph.model import Parameter, names_of
 from equimorph.model.parameter import Role

@@ -5,8 +5,7 @@ from functools import partial
 
 import numpy as np
 
-from equimorph.array_types import Float
-from equimorph.arrays import Lanes, Parameters, Values
+from equimorph.arrays import Float, Lanes, Parameters, Values
 from equimorph.errors import InputError
 from equimorph.model import Descriptor, Vanishing
 from equimorph.structures.rod.lateral import Coefficients, Movements, OutOfPlane

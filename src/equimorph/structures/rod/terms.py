@@ -9,7 +9,7 @@ import numpy as np
 
 from equimorph.argument_checks import check_arguments
 from equimorph.argument_notes import LOAD_DIRECTION
-from equimorph.array_types import Float
+from equimorph.arrays import Float
 from equimorph.errors import InputError
 from equimorph.model import Rebuilt
 from equimorph.structures.rod.discretisation import Mesh

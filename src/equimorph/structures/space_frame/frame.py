@@ -8,8 +8,7 @@ import numpy as np
 
 from equimorph.argument_checks import check_arguments
 from equimorph.argument_vocabulary import count
-from equimorph.array_types import Float
-from equimorph.arrays import Flags, Lanes, Parameters, Values
+from equimorph.arrays import Flags, Float, Lanes, Parameters, Values
 from equimorph.errors import InputError
 from equimorph.model import Descriptor, remember_call
 from equimorph.structures.contract import Readers, Symmetry, Written

@@ -7,8 +7,7 @@ the multipliers. As for rods in space, ½ k m (|q|² − 1)² keeps lengths at 1
 
 import numpy as np
 
-from equimorph.array_types import Float, Int
-from equimorph.arrays import Lanes, Parameters, Scalars, Values
+from equimorph.arrays import Float, Int, Lanes, Parameters, Scalars, Values
 from equimorph.errors import InputError
 from equimorph.structures.equations import Direction
 from equimorph.structures.space_frame.model import SpatialFrameModel

@@ -6,8 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from equimorph.array_types import Float, Int
-from equimorph.arrays import Entries, Flags, Lanes, Parameters, Sides, Values
+from equimorph.arrays import Entries, Flags, Float, Int, Lanes, Parameters, Sides, Values
 from equimorph.linalg import BorderedSolution
 from equimorph.linalg.dense import no_border
 from equimorph.linalg.sparse import SparseLayout

@@ -14,7 +14,7 @@ from equimorph.argument_notes import (
     THREE_QUANTITIES,
     positive_quantity,
 )
-from equimorph.array_types import Float
+from equimorph.arrays import Float
 from equimorph.errors import InputError
 from equimorph.structures.frame.member import AnyMember
 from equimorph.structures.network import check_hinges

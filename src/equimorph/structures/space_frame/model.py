@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from equimorph.array_types import Bool, Float, Int
+from equimorph.arrays import Bool, Float, Int
 from equimorph.structures.frame.any_model import AnyFrameModel
 from equimorph.structures.space_frame.network import SpatialNetwork, Turning
 from equimorph.structures.space_frame.statics import NOTHING, SpaceFlows, SpaceStatics

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from equimorph.array_types import Float, Int
+from equimorph.arrays import Float, Int
 from equimorph.errors import InputError
 from equimorph.structures.frame.any_model import WEIGHT, AnyFrameNetwork
 from equimorph.structures.network import Joints, edges_between, places_of_joints, supported_joints

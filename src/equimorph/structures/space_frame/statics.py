@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from equimorph.array_types import Float, Int
+from equimorph.arrays import Float, Int
 from equimorph.errors import InputError
 from equimorph.structures.frame.statics import Graph
 

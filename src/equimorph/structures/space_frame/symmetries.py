@@ -4,8 +4,7 @@ from functools import cached_property
 
 import numpy as np
 
-from equimorph.array_types import Float, Int
-from equimorph.arrays import Lanes
+from equimorph.arrays import Float, Int, Lanes
 from equimorph.structures.frame.images import NOWHERE, Effects, FrameImage
 from equimorph.tolerances import SAME_NUMBER
 

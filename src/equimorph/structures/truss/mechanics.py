@@ -5,8 +5,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from equimorph.array_types import Float, Int
-from equimorph.arrays import Entries, Flags, Lanes, Parameters, Values
+from equimorph.arrays import Entries, Flags, Float, Int, Lanes, Parameters, Values
 from equimorph.linalg.dense import multiply
 from equimorph.linalg.intervals import Interval, product, square, symmetric
 from equimorph.linalg.sparse import SparseLayout

@@ -9,7 +9,7 @@ import numpy as np
 
 from equimorph.argument_checks import check_arguments
 from equimorph.argument_notes import TWO_NAMES
-from equimorph.array_types import Bool, Float, Int
+from equimorph.arrays import Bool, Float, Int
 from equimorph.errors import InputError
 from equimorph.linalg.intervals import Interval, inverse, rising, square
 from equimorph.structures.network import (

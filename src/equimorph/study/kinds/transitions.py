@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from equimorph import plotting
-from equimorph.array_types import Float
+from equimorph.arrays import Float
 from equimorph.dynamics.shock import LeastShock, least_shock
 from equimorph.equilibria import EnergyBarrier, EnergyPath, TransitionNetwork, transition_network
 from equimorph.manifold import barriers

@@ -6,8 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from equimorph.array_types import Float
-from equimorph.arrays import Lanes, Parameters
+from equimorph.arrays import Float, Lanes, Parameters
 from equimorph.equilibria import ParameterLine, TraceOptions, settle, trace
 from equimorph.equilibria.trace_options import EventCode
 from equimorph.errors import InputError

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from equimorph.argument_checks import check_arguments
-from equimorph.array_types import Float
+from equimorph.arrays import Float
 from equimorph.equilibria import check_start
 from equimorph.errors import InputError
 from equimorph.structures import States

@@ -9,8 +9,7 @@ from numpy.typing import ArrayLike
 
 from equimorph.argument_checks import check_arguments
 from equimorph.argument_kinds import NUMBERS
-from equimorph.array_types import Float
-from equimorph.arrays import Lanes, Parameters
+from equimorph.arrays import Float, Lanes, Parameters
 from equimorph.errors import InputError
 from equimorph.model import Descriptor
 from equimorph.structures import States, Structure

@@ -7,8 +7,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
-from equimorph.array_types import Float
-from equimorph.arrays import Parameters
+from equimorph.arrays import Float, Parameters
 from equimorph.errors import InputError
 from equimorph.model import Rebuilt, position
 from equimorph.structures import States, Structure

@@ -8,8 +8,7 @@ import numpy as np
 
 from equimorph.argument_checks import check_arguments
 from equimorph.argument_kinds import as_array, short
-from equimorph.array_types import Float
-from equimorph.arrays import Lanes, Parameters
+from equimorph.arrays import Float, Lanes, Parameters
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet, equilibrium_set
 from equimorph.manifold.geometry.tangents import split_step

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import minimize
 
-from equimorph.array_types import Float
+from equimorph.arrays import Float
 from equimorph.tasks.designing.bounds import Asked, DesignBound, Numbers, VariableBounds
 from equimorph.tasks.designing.family import DesignFamily, Vector
 from equimorph.tasks.designing.pieces import Piece, follow_piece

@@ -17,7 +17,7 @@ from scipy.linalg import eigh, null_space
 
 from equimorph.argument_checks import check_arguments
 from equimorph.argument_vocabulary import count
-from equimorph.array_types import Float
+from equimorph.arrays import Float
 from equimorph.structures.rod.discretisation import reference_element
 
 Supports = Literal["clamped-free", "clamped-clamped"]

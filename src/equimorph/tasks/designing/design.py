@@ -12,7 +12,7 @@ import numpy as np
 from equimorph.argument_checks import check_arguments
 from equimorph.argument_kinds import short
 from equimorph.argument_vocabulary import count
-from equimorph.array_types import Float
+from equimorph.arrays import Float
 from equimorph.errors import InputError
 from equimorph.structures import State, Structure
 from equimorph.tasks.designing.bounds import Asked, DesignBound

@@ -8,8 +8,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from equimorph.argument_kinds import as_array, short
-from equimorph.array_types import Float
-from equimorph.arrays import Lanes, Parameters
+from equimorph.arrays import Float, Lanes, Parameters
 from equimorph.errors import InputError
 from equimorph.structures import Structure
 from equimorph.tasks.calibration.measurements import by_data

@@ -13,8 +13,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from equimorph.array_types import Float
-from equimorph.arrays import Lanes, Parameters, Some
+from equimorph.arrays import Float, Lanes, Parameters, Some
 from equimorph.equilibria import settle
 from equimorph.equilibria.newton_step import free_directions
 from equimorph.errors import InputError

@@ -12,8 +12,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
-from equimorph.array_types import Float
-from equimorph.arrays import Lanes, Parameters
+from equimorph.arrays import Float, Lanes, Parameters
 from equimorph.equilibria import LimitLoad, limit_load, settle
 from equimorph.equilibria.newton_step import free_directions
 from equimorph.equilibria.point_conditions import Fold, Values

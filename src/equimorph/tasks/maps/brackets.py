@@ -5,8 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from equimorph.array_types import Bool, Float, Int, Shaped
-from equimorph.arrays import Edges, Lanes, Parameters, Settings, Values
+from equimorph.arrays import Bool, Edges, Float, Int, Lanes, Parameters, Settings, Shaped, Values
 from equimorph.columns import Columns
 from equimorph.structures import Structure
 

@@ -11,8 +11,7 @@ from functools import partial
 
 import numpy as np
 
-from equimorph.array_types import Bool, Float, Int
-from equimorph.arrays import Edges, Flags, Settings, Values
+from equimorph.arrays import Bool, Edges, Flags, Float, Int, Settings, Values
 from equimorph.columns import Columns
 from equimorph.equilibria.critical import Critical, Test
 from equimorph.equilibria.critical_tests import TestsOf, correct_singular_states

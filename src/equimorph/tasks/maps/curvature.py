@@ -8,8 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
-from equimorph.array_types import Bool
-from equimorph.arrays import Flags, Values
+from equimorph.arrays import Bool, Flags, Values
 from equimorph.equilibria import TraceOptions
 from equimorph.equilibria.critical import Critical
 from equimorph.equilibria.critical_tests import bound, branching, gap, grazing, quadratic

@@ -8,8 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from equimorph.array_types import Bool, Float, Int
-from equimorph.arrays import Settings
+from equimorph.arrays import Bool, Float, Int, Settings
 from equimorph.columns import Columns
 from equimorph.equilibria.natural_sheet import NaturalSheet
 from equimorph.structures import States

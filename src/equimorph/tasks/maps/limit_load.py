@@ -8,8 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
-from equimorph.array_types import Bool
-from equimorph.arrays import Edges, Flags, Lanes, Parameters, Settings, Values
+from equimorph.arrays import Bool, Edges, Flags, Lanes, Parameters, Settings, Values
 from equimorph.equilibria import LimitLoad, ParameterLine, TraceOptions, limit_load, trace
 from equimorph.equilibria.critical import Critical, null_border
 from equimorph.equilibria.critical_tests import bound, branching, gap, grazing, quadratic

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from equimorph.array_types import Float, Int
+from equimorph.arrays import Float, Int
 from equimorph.equilibria import Event, EventKind, Leg, Path, TraceOptions, lift
 from equimorph.equilibria.settle import distances
 from equimorph.model import Constraint, Descriptor, are_feasible, names_of

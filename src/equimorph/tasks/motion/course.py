@@ -6,8 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from equimorph.array_types import Float, Int
-from equimorph.arrays import Lanes, Parameters
+from equimorph.arrays import Float, Int, Lanes, Parameters
 from equimorph.equilibria import Leg
 from equimorph.equilibria.legs import replace_parameters
 from equimorph.equilibria.point_conditions import Values as TargetValues

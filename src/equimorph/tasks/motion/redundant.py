@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from equimorph.array_types import Float, Int
+from equimorph.arrays import Float, Int
 from equimorph.equilibria import Event, EventKind
 from equimorph.equilibria.settle import distances
 from equimorph.model import Constraint

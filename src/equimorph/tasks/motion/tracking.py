@@ -8,8 +8,7 @@ from typing import Literal
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
-from equimorph.array_types import Float
-from equimorph.arrays import Lanes, Parameters, Values
+from equimorph.arrays import Float, Lanes, Parameters, Values
 from equimorph.equilibria import Event, Leg, Path, Waypoint, check_start, lift
 from equimorph.equilibria.trace_options import VIOLATIONS
 from equimorph.errors import InputError

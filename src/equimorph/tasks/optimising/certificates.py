@@ -6,7 +6,7 @@ from typing import Literal
 
 import numpy as np
 
-from equimorph.array_types import Float, Int
+from equimorph.arrays import Float, Int
 from equimorph.tasks.optimising.programme import Programme, is_stability
 from equimorph.tasks.optimising.sqp import CriticalPoint
 

@@ -9,8 +9,7 @@ from itertools import combinations_with_replacement
 
 import numpy as np
 
-from equimorph.array_types import Float, Int
-from equimorph.arrays import Cells, Flags, Lanes, Parameters
+from equimorph.arrays import Cells, Flags, Float, Int, Lanes, Parameters
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.queries.nearest import SetPoints, points_at_vertices
 from equimorph.model import Constraint, Descriptor

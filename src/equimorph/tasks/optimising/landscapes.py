@@ -8,8 +8,7 @@ from typing import Literal
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
-from equimorph.array_types import Bool, Float, Int
-from equimorph.arrays import Flags, Lanes, Values
+from equimorph.arrays import Bool, Flags, Float, Int, Lanes, Values
 from equimorph.equilibria import ParameterLine, TraceOptions, trace
 from equimorph.equilibria.trace_options import EventCode
 from equimorph.errors import InputError

@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
-from equimorph.array_types import Float
+from equimorph.arrays import Float
 from equimorph.equilibria import Event, EventKind, Leg
 from equimorph.errors import InputError
 from equimorph.manifold.geometry.setting import Setting, embed

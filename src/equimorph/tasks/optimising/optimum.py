@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
-from equimorph.array_types import Bool
+from equimorph.arrays import Bool
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.queries.nearest import SetPoints, local_minima, points_at_vertices

@@ -5,7 +5,7 @@ from typing import Literal
 
 import numpy as np
 
-from equimorph.array_types import Float
+from equimorph.arrays import Float
 from equimorph.model import Schedule
 from equimorph.structures import State, States
 from equimorph.tasks.optimising.certificates import Certificate

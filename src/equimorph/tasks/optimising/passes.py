@@ -12,8 +12,7 @@ from itertools import combinations, islice
 
 import numpy as np
 
-from equimorph.array_types import Float
-from equimorph.arrays import Some, Values
+from equimorph.arrays import Float, Some, Values
 from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.queries.nearest import SetPoints
 from equimorph.structures import States

@@ -6,8 +6,7 @@ from itertools import combinations
 
 import numpy as np
 
-from equimorph.array_types import Float
-from equimorph.arrays import Flags, Frames, Lanes, Parameters, Some, Values
+from equimorph.arrays import Flags, Float, Frames, Lanes, Parameters, Some, Values
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.geometry.setting import Setting
 from equimorph.manifold.queries.nearest import SetPoints

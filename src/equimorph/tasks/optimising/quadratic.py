@@ -6,7 +6,7 @@ from math import comb
 
 import numpy as np
 
-from equimorph.array_types import Bool, Float, Int
+from equimorph.arrays import Bool, Float, Int
 
 Vector = Float[np.ndarray, " d"]
 

@@ -5,8 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from equimorph.array_types import Float
-from equimorph.arrays import Pair
+from equimorph.arrays import Float, Pair
 from equimorph.equilibria.critical import Critical, Test, null_border
 from equimorph.equilibria.critical_tests import bound, branching, gap, grazing, quadratic
 from equimorph.equilibria.locus import Locus, Spots, advance, nearest

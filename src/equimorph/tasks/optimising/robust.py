@@ -10,8 +10,7 @@ from typing import Literal
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
-from equimorph.array_types import Float
-from equimorph.arrays import Lanes, Parameters, Values
+from equimorph.arrays import Float, Lanes, Parameters, Values
 from equimorph.equilibria import Corner, corners_of, worst_over
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.queries.nearest import SetPoints

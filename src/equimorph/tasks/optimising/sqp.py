@@ -7,8 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from equimorph.array_types import Float, Int
-from equimorph.arrays import Frames, ItemFlags, Items, Some
+from equimorph.arrays import Float, Frames, Int, ItemFlags, Items, Some
 from equimorph.manifold.geometry.setting import Setting, embed
 from equimorph.manifold.queries.nearest import SetPoints
 from equimorph.structures import States

@@ -8,8 +8,7 @@ from typing import Literal
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
-from equimorph.array_types import Float
-from equimorph.arrays import Flags, Settings, Values
+from equimorph.arrays import Flags, Float, Settings, Values
 from equimorph.equilibria import LimitLoad
 from equimorph.errors import InputError
 from equimorph.tasks.maps.actuator_map import settings_of

@@ -4,8 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from equimorph.array_types import Float
-from equimorph.arrays import Flags, Frames, Lanes, Parameters, Rows
+from equimorph.arrays import Flags, Float, Frames, Lanes, Parameters, Rows
 from equimorph.equilibria import settle
 from equimorph.equilibria.sensitivity import answers
 from equimorph.manifold import EquilibriumSet

@@ -5,8 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from equimorph.array_types import Float
-from equimorph.arrays import Pair, Values
+from equimorph.arrays import Float, Pair, Values
 from equimorph.model import Box
 from equimorph.tasks.optimising.quadratic import Quadratic, solve
 

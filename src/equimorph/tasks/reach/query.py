@@ -6,8 +6,7 @@ from typing import Literal
 
 import numpy as np
 
-from equimorph.array_types import Int
-from equimorph.arrays import Lanes, Parameters, Values
+from equimorph.arrays import Int, Lanes, Parameters, Values
 from equimorph.equilibria.sensitivity import steering
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet

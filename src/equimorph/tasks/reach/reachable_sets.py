@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
-from equimorph.array_types import Bool, Float, Int
+from equimorph.arrays import Bool, Float, Int
 from equimorph.errors import InputError
 from equimorph.manifold import Division, EquilibriumSet, divided, part, refine
 from equimorph.manifold.geometry.topology import adjacency, labels

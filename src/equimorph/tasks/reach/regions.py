@@ -7,7 +7,7 @@ from typing import Literal
 
 import numpy as np
 
-from equimorph.array_types import Bool, Float, Int
+from equimorph.arrays import Bool, Float, Int
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet, cell_sizes
 from equimorph.manifold.geometry.simplices import volumes

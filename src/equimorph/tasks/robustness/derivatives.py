@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
-from equimorph.array_types import Float
+from equimorph.arrays import Float
 from equimorph.equilibria import LimitLoad, check_start
 from equimorph.equilibria.trace_options import VIOLATIONS
 from equimorph.errors import InputError

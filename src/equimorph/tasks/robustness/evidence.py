@@ -6,7 +6,7 @@ from typing import Literal
 import numpy as np
 from scipy.special import betaincinv
 
-from equimorph.array_types import Float, Shaped
+from equimorph.arrays import Float, Shaped
 from equimorph.tasks.robustness.erring import Errors, Offsets
 from equimorph.tasks.verification.tube import TubeProof
 

@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
-from equimorph.array_types import Float
+from equimorph.arrays import Float
 from equimorph.equilibria import LimitLoad, lift, limit_load
 from equimorph.equilibria.trace_options import VIOLATIONS
 from equimorph.errors import InputError

@@ -8,8 +8,7 @@ from typing import Literal
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
-from equimorph.array_types import Float, Int
-from equimorph.arrays import Parameters, Values
+from equimorph.arrays import Float, Int, Parameters, Values
 from equimorph.equilibria import ParameterLine, TraceOptions, trace
 from equimorph.equilibria.legs import check_starts
 from equimorph.equilibria.trace_options import EventCode

@@ -6,8 +6,7 @@ from typing import Literal
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
-from equimorph.array_types import Float
-from equimorph.arrays import Flags, Lanes, Parameters, Some, Values
+from equimorph.arrays import Flags, Float, Lanes, Parameters, Some, Values
 from equimorph.equilibria import Landing, lift, snap_landing
 from equimorph.manifold import EquilibriumSet, StabilityDistance, stability_distance
 from equimorph.manifold.geometry.setting import embed

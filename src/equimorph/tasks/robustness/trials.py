@@ -8,8 +8,7 @@ from typing import Literal
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
-from equimorph.array_types import Bool, Float, Int, Shaped
-from equimorph.arrays import Lanes, Parameters, Values
+from equimorph.arrays import Bool, Float, Int, Lanes, Parameters, Shaped, Values
 from equimorph.columns import Columns
 from equimorph.equilibria import lift, way_points
 from equimorph.errors import InputError

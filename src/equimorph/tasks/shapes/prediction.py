@@ -6,8 +6,7 @@ from functools import cached_property
 import numpy as np
 from scipy.spatial import cKDTree
 
-from equimorph.array_types import Bool, Float, Int
-from equimorph.arrays import Edges, Rows, Some
+from equimorph.arrays import Bool, Edges, Float, Int, Rows, Some
 from equimorph.equilibria.point_conditions import Values
 from equimorph.equilibria.settle import Guards, Settled, embedded_planes, free_directions, settle
 from equimorph.manifold import EquilibriumSet, Level, level_set

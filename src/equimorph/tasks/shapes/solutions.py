@@ -9,8 +9,7 @@ from typing import Literal
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
-from equimorph.array_types import Float, Int
-from equimorph.arrays import Values
+from equimorph.arrays import Float, Int, Values
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet, Level
 from equimorph.manifold.queries.nearest import SetPoints, local_minima, points_at_vertices

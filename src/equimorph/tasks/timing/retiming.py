@@ -15,7 +15,7 @@ from math import factorial
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
-from equimorph.array_types import Float, Int
+from equimorph.arrays import Float, Int
 from equimorph.errors import InputError
 from equimorph.model import Constraint, Rates, Schedule
 from equimorph.structures import State, Structure

@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
-from equimorph.array_types import Float, Int
+from equimorph.arrays import Float, Int
 from equimorph.equilibria import check_start
 from equimorph.errors import InputError
 from equimorph.model import Rates, Schedule, names_of

@@ -9,8 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
-from equimorph.array_types import Float
-from equimorph.arrays import Lanes
+from equimorph.arrays import Float, Lanes
 from equimorph.equilibria import Event, lift
 from equimorph.equilibria.legs import check_starts
 from equimorph.model import Box, position

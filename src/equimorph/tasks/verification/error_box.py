@@ -9,8 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from equimorph.array_types import Float
-from equimorph.arrays import Lanes, Parameters
+from equimorph.arrays import Float, Lanes, Parameters
 from equimorph.columns import Columns
 from equimorph.linalg.intervals import Interval, join, product
 from equimorph.structures import Enclosed, States, Structure

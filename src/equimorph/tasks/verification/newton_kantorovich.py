@@ -18,8 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from equimorph.array_types import Float, Int
-from equimorph.arrays import Flags, Lanes, Parameters, Values
+from equimorph.arrays import Flags, Float, Int, Lanes, Parameters, Values
 from equimorph.columns import Columns
 from equimorph.linalg.intervals import MORE, Interval, product
 from equimorph.structures import Enclosed, States, Structure

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from equimorph.array_types import Float
+from equimorph.arrays import Float
 from equimorph.structures import States, join_states
 from equimorph.tasks.verification.evidence import (
     Evidence,

@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from equimorph.array_types import Float
-from equimorph.arrays import Lanes, Parameters
+from equimorph.arrays import Float, Lanes, Parameters
 from equimorph.linalg.intervals import Interval
 from equimorph.structures import Direction, Enclosed, Structure
 

@@ -8,8 +8,7 @@ from typing import Literal
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
-from equimorph.array_types import Float, Int
-from equimorph.arrays import Flags
+from equimorph.arrays import Flags, Float, Int
 from equimorph.equilibria import (
     Event,
     Lifts,

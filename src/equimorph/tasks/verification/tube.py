@@ -13,8 +13,7 @@ from typing import Literal
 
 import numpy as np
 
-from equimorph.array_types import Float, Int
-from equimorph.arrays import Flags, Items, Lanes, Pairs, Parameters
+from equimorph.arrays import Flags, Float, Int, Items, Lanes, Pairs, Parameters
 from equimorph.columns import Columns
 from equimorph.equilibria import Event, ParameterLine, TraceOptions, settle, trace
 from equimorph.equilibria.soft_modes import metric_length

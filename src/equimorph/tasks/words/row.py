@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
-from equimorph.array_types import Float
+from equimorph.arrays import Float
 from equimorph.equilibria import find_equilibria, settle
 from equimorph.errors import InputError
 from equimorph.model import Constraint, Parameter, parameter_vector

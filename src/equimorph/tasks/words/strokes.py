@@ -6,8 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
-from equimorph.array_types import Float
-from equimorph.arrays import Items, Place, Values
+from equimorph.arrays import Float, Items, Place, Values
 from equimorph.equilibria import EventKind, Lifts, TraceOptions, lift
 from equimorph.equilibria.descents import Descents, descend
 from equimorph.equilibria.gradient_flow import FAITHFUL, Ending

@@ -15,8 +15,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import breadth_first_order, dijkstra
 
 from equimorph.argument_checks import check_arguments
-from equimorph.array_types import Int
-from equimorph.arrays import Flags, Values
+from equimorph.arrays import Flags, Int, Values
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet, SnapGraph, snap_graph
 from equimorph.manifold.queries.snap_graph import NOWHERE
