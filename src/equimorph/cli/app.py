@@ -40,26 +40,12 @@ app = typer.Typer(
 )
 
 
-class Kind(StrEnum):
-    """Kinds of studies that can be begun."""
-
-    arch = "arch"
-    arm = "arm"
-    beam = "beam"
-    bridge = "bridge"
-    calibration = "calibration"
-    column = "column"
-    deep_arch = "deep_arch"
-    drive = "drive"
-    lee = "lee"
-    maps = "maps"
-    motion = "motion"
-    network = "network"
-    spring = "spring"
-    stack = "stack"
-    bistable_strip = "strip"  # a member called strip would hide that of str
-    tasks = "tasks"
-    truss = "truss"
+TEMPLATES = Path(__file__).parents[1] / "study" / "templates"
+Kind = StrEnum(  # type: ignore[misc]  # a member called strip would hide that of str
+    "Kind", [(f"{each.stem}_study", each.stem) for each in sorted(TEMPLATES.glob("*.toml"))]
+)
+"""Kinds of studies that can be begun."""
+ARCH = Kind("arch")
 
 
 def quiet_libraries() -> None:
@@ -133,7 +119,7 @@ def new(
             "the spring, measured shapes (calibration), motions in time (motion), or every "
             "question that there is (tasks)."
         ),
-    ] = Kind.arch,
+    ] = ARCH,
 ) -> None:
     """Begin a study: write an example file to change."""
     from equimorph.study.template import write_template
