@@ -2,11 +2,13 @@
 
 PYTHON ?= python3
 BIN := .venv/bin
+RUNTIME := .venv/.runtime
 INSTALLED := .venv/.installed
+INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile --editable
 # One thread per worker in the linear algebra library: two workers share the machine.
 QUIET_THREADS := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 
-.PHONY: run paper test test-slow lint docs lock bench explorer clean
+.PHONY: run paper test kernels test-slow lint docs lock bench explorer clean
 
 run: $(INSTALLED)
 	$(BIN)/equimorph run examples/arch.toml
@@ -15,9 +17,12 @@ paper: $(INSTALLED)
 	$(BIN)/equimorph paper
 
 # First all kernels, each once, on all cores: two workers would compile most of them twice.
-test: $(INSTALLED)
-	$(BIN)/python -m equimorph.linalg.compile_ahead
+test: $(INSTALLED) kernels
 	$(QUIET_THREADS) $(BIN)/python -m pytest -n 2 --dist worksteal -m "not slow"
+
+# From the sources, even while the package is installed anew with more requirements.
+kernels: $(RUNTIME)
+	PYTHONPATH=src $(BIN)/python -m equimorph.linalg.compile_ahead
 
 # `make test-slow TENTH=3` runs a tenth of them; TENTH is any number, its last digit counts. They
 # repeat with more cases what fast tests do, whose shapes are checked.
@@ -56,13 +61,17 @@ clean:
 	    results dist explorer/node_modules
 	find src tests -name __pycache__ -type d -prune -exec rm -rf {} +
 
-$(INSTALLED): pyproject.toml
+$(RUNTIME): pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
 	    { echo "equimorph needs Python 3.11 or newer; say: make PYTHON=/path/to/python3.11" >&2; exit 1; }
 	test -x $(BIN)/python || $(PYTHON) -m venv .venv
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile --editable '.[dev]'
+	$(INSTALL) .
+	touch $(RUNTIME)
+
+$(INSTALLED): $(RUNTIME)
+	$(INSTALL) '.[dev]'
 	touch $(INSTALLED)
 
 .venv/.docs: $(INSTALLED)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile --editable '.[dev,docs]'
+	$(INSTALL) '.[dev,docs]'
 	touch .venv/.docs

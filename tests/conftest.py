@@ -29,9 +29,13 @@ if os.environ.get("EQUIMORPH_SHAPES", "checked") != "unchecked":
     install()
 
 TENTHS = 10
-END_TO_END = ("cli", "explorer", "paper", "plotting", "study")
-"""Folders of tests that run what others test piece by piece, with the checks: here these only cost
-time."""
+END_TO_END = (
+    *("cli", "explorer", "paper", "plotting", "study", "validation"),
+    *("test_argument_checks.py", "test_docs_site.py", "test_frame_gallery.py", "test_gallery.py"),
+    *("test_readme.py", "test_route_certificates.py"),
+)
+"""Folders and files of tests that run what others test piece by piece, with the checks: here these
+only cost time."""
 
 collect_ignore = ["typing/uses.py"]
 """Read by type checkers, never run: half of its lines are wrong."""

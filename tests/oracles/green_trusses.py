@@ -22,14 +22,16 @@ class GreenTruss:
 
     def __call__(self, u):
         """∂E/∂u and its Jacobian, over EA/l₀ of a unit bar."""
-        d = self.drawn + np.einsum("bcu,lu->lbc", self.change, u)
+        bars, _, n = self.change.shape
+        d = self.drawn + (u @ self.change.reshape(-1, n).T).reshape(-1, bars, 2)
         rest = np.linalg.norm(self.drawn, axis=1)
         strain = 0.5 * ((d**2).sum(axis=2) / rest**2 - 1.0)
         weight = self.stiffness / rest
-        force = np.einsum("lb,lbc,bcu->lu", weight * strain, d, self.change) - self.pull
-        along = np.einsum("lbc,bcu->lbu", d, self.change)
-        stiff = np.einsum("lb,bcu,bcv->luv", weight * strain, self.change, self.change)
-        return force, stiff + np.einsum("b,lbu,lbv->luv", weight / rest**2, along, along)
+        along = (d.swapaxes(0, 1) @ self.change).swapaxes(0, 1)
+        force = ((weight * strain)[:, None] @ along)[:, 0] - self.pull
+        alike = np.einsum("bcu,bcv->buv", self.change, self.change).reshape(bars, -1)
+        bent = ((weight * strain) @ alike).reshape(-1, n, n)
+        return force, bent + (along * (weight / rest**2)[:, None]).swapaxes(1, 2) @ along
 
 
 def random_green_truss(unknowns: int, generator: np.random.Generator) -> GreenTruss:

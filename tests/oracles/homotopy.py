@@ -56,13 +56,7 @@ def complex_roots(
         k3 = velocity(here + 0.5 * s * k2, now + 0.5 * step)
         k4 = velocity(here + s * k3, now + step)
         guess = here + s * (k1 + 2 * k2 + 2 * k3 + k4) / 6
-        first = None
-        for _ in range(3):
-            value, slope, _ = both(guess, now + step)
-            change = np.linalg.solve(slope, value[:, :, None])[:, :, 0]
-            guess = guess - change
-            size = np.linalg.norm(change, axis=1) / (1.0 + np.linalg.norm(guess, axis=1))
-            first = size if first is None else first
+        guess, size, first = _corrected(both, guess, now + step)
         good = (size < CLOSE) & (first < 1e-3)
         x[go[good]], t[go[good]] = guess[good], (now + step)[good]
         h[go] = np.clip(h[go] * np.where(good, np.where(first < 1e-5, 2.0, 1.0), 0.4), 0.0, LONGEST)
@@ -71,6 +65,22 @@ def complex_roots(
         ended[go[gone]], x[go[gone]] = True, np.nan
         lost[go] = ~ended[go] & (h[go] < SHORTEST)
     return x[~lost & np.isfinite(x).all(axis=1)], int(lost.sum())
+
+
+def _corrected(
+    both: Callable[..., tuple[np.ndarray, ...]], x: np.ndarray, t: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Three steps of Newton's method at most, and the sizes of the last and of the first."""
+    x, sizes = x.copy(), [np.full(len(x), np.inf)]
+    for _ in range(3):
+        size = sizes[-1].copy()
+        left = np.flatnonzero(size >= CLOSE)
+        value, slope, _ = both(x[left], t[left])
+        change = np.linalg.solve(slope, value[:, :, None])[:, :, 0]
+        x[left] -= change
+        size[left] = np.linalg.norm(change, axis=1) / (1.0 + np.linalg.norm(x[left], axis=1))
+        sizes.append(size)
+    return x, sizes[-1], sizes[1]
 
 
 def real_roots(

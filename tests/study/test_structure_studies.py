@@ -47,7 +47,11 @@ A = [0.1, 0, 0]
 [set]
 box = { P = [0.0, 3.0] }
 intervals = [4]
+checks = 0
 """
+"""No independent search: Newton's method from random guesses leads to states in which one node's
+quaternion is the negative of its neighbours', which no mesh resolves and which count as left out.
+The set is followed from the natural state through its folds."""
 
 
 def example(name: str, *coarser: tuple[str, str]) -> str:
@@ -83,8 +87,10 @@ def check_frame(outcome: Outcome) -> None:
 
 
 def check_cross(outcome: Outcome) -> None:
-    """A set over one load through the fold of a cross of two arches."""
-    assert set(outcome.equilibrium_set.points.index.tolist()) >= {0, 1}
+    """A set over one load through the folds of a cross of two arches."""
+    eset = outcome.equilibrium_set
+    assert set(eset.points.index.tolist()) == {0, 1, 2}
+    assert eset.audit.largest_residual < 1e-9
 
 
 @dataclass(frozen=True)
