@@ -14,14 +14,11 @@ is given), turns about the axes of the cross-section (else there is no moment).
 - `Rod.solved` is Newton's method for all pieces together; `determinant` vanishes at critical
   points, whichever way the rod got there.
 - `index` counts points conjugate to s = 0 [ManningRogersMaddocks1998]_; it needs a clamp at s = 1.
-- `branch` follows equilibria by arclength while one parameter changes, through folds, and tells
-  where the determinant vanishes.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import pairwise
 
 import numpy as np
 from scipy.optimize import brentq
@@ -405,87 +402,6 @@ def straight(pieces, start, end, stiffness, force=(0.0, 0.0, 0.0), twist=0.0, **
     y[:, 3], y[:, 4] = np.cos(0.5 * twist * s), np.sin(0.5 * twist * s)
     y[:, 10] = np.asarray(stiffness, float).reshape(-1, 3)[0, 0] * twist
     return Rod(y, start, end, stiffness, **more)
-
-
-@dataclass(frozen=True)
-class Point:
-    """A point of a branch."""
-
-    rod: Rod
-    value: float
-
-
-def branch(
-    problem: Callable[[float, Rod], Rod], first: Rod, value: float, step: float, points: int,
-) -> Iterator[Point]:  # fmt: skip
-    """Equilibria by arclength in (state, parameter), through folds.
-
-    problem: the rod with its conditions at a value of the parameter; step: signed, the first
-    change of the parameter alone.
-    """
-    rod = problem(value, first).solved()
-    yield Point(rod, value)
-    tangent = None
-    for _ in range(points):
-        direction = _tangent(problem, rod, value, tangent, np.sign(step))
-        rod, value = _corrected(problem, rod, value, direction, abs(step))
-        tangent = direction
-        yield Point(rod, value)
-
-
-DIFFERENCE = 1e-6
-"""Change of the parameter for its derivative."""
-
-
-def _by_parameter(problem, rod, value):
-    ahead, behind = (problem(value + d, rod)._linear[0] for d in (DIFFERENCE, -DIFFERENCE))
-    return (ahead - behind) / (2.0 * DIFFERENCE)
-
-
-def _tangent(problem, rod, value, before, sign):
-    residual, matrix = problem(value, rod)._linear
-    column = _by_parameter(problem, rod, value)
-    border = np.append(np.zeros(len(residual)), sign) if before is None else before
-    full = np.block([[matrix, column[:, None]], [border[None]]])
-    tangent = np.linalg.solve(full, np.append(np.zeros(len(residual)), 1.0))
-    return tangent / np.linalg.norm(tangent)
-
-
-def _corrected(problem, rod, value, direction, length):
-    start, origin = rod.y.ravel(), value
-    guess = np.append(start, value) + length * direction
-    for _ in range(30):
-        rod = replace(rod, y=guess[:-1].reshape(rod.y.shape))
-        value = float(guess[-1])
-        residual, matrix = problem(value, rod)._linear
-        column = _by_parameter(problem, rod, value)
-        gap = direction @ (guess - np.append(start, origin)) - length
-        full = np.block([[matrix, column[:, None]], [direction[None]]])
-        step = np.linalg.solve(full, -np.append(residual, gap))
-        guess = guess + step
-        if np.abs(step).max() < 1e-9 * (1.0 + np.abs(guess).max()):
-            rod = problem(float(guess[-1]), replace(rod, y=guess[:-1].reshape(rod.y.shape)))
-            return rod, float(guess[-1])
-    raise RuntimeError("no convergence along the branch")
-
-
-def critical_points(
-    problem: Callable[[float, Rod], Rod], first: Rod, value: float, step: float, points: int,
-    test: Callable[[Rod], float] = lambda rod: rod.determinant,
-) -> list[Point]:  # fmt: skip
-    """Where the determinant, or another test, changes its sign along a branch, by Brent's rule."""
-    found, tangent = [], None
-    for before, after in pairwise(branch(problem, first, value, step, points)):
-        tangent = _tangent(problem, before.rod, before.value, tangent, np.sign(step))
-        if test(before.rod) * test(after.rod) >= 0.0:
-            continue
-
-        def point(length, before=before, tangent=tangent):
-            return Point(*_corrected(problem, before.rod, before.value, tangent, length))
-
-        zero = brentq(lambda length: test(point(length).rod), 0.0, abs(step), xtol=1e-13)
-        found.append(point(zero))
-    return found
 
 
 def double_zero(test: Callable[[float], float], low: float, high: float) -> float:

@@ -6,6 +6,7 @@ from 2 conj(q) q', L = Σ m (½ (u − u₀)·K (u − u₀) + f·Re₁ − ½ f
 """
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from equimorph.structures import Curvature, LineLoad, PointForce, SpatialEnd, SpatialRod, Tendon
 from oracles.rods import Quadrature, column
@@ -233,3 +234,20 @@ def coaxial(elements=4, degree=4):
         return out + g.total(a1 - a1**2 / 12) - (lam[:, 0] + P) * nu
 
     return rod, (0.2, 0.5, 0.2, 0.84), lagrangian
+
+
+def shot(state, stiffness, pieces=6):
+    """A state as a guess of multiple shooting (`oracles.kirchhoff`), and stiffnesses in its units.
+
+    Forces are those of the support at A: of loads along the way the caller adds what they take.
+    """
+    rod, s = state.structure, np.arange(pieces) / pieces
+    frames = rod.frames(state.z[None], state.p[None], s)[0]
+    given = UNIT * np.array(stiffness)
+    strains = np.array([[float(each(state)) for each in rod.strains(at)] for at in s])
+    y = np.zeros((pieces, 13))
+    y[:, :3] = state.shape(s)
+    y[:, 3:7] = Rotation.from_matrix(frames).as_quat(scalar_first=True)
+    y[:, 7:10] = [-float(rod.support_force(each)(state)) for each in "xyz"]
+    y[:, 10:13] = np.einsum("ick,ik->ic", frames, given * strains)
+    return y, given

@@ -8,12 +8,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 
 import equimorph as em
 from oracles.kirchhoff import Rod, about, clamp
+from oracles.spatial_rods import shot
 
-FORCE = 4.0 * np.pi**2
 PIECES = 6
 
 
@@ -26,18 +25,10 @@ def result():
     return module.main()
 
 
-def shot(state: em.State, torsion: float) -> Rod:
+def aside(state: em.State, torsion: float) -> Rod:
     """The state as a guess of shooting; the force across the middle lies between two pieces."""
-    rod, s = state.structure, np.arange(PIECES) / PIECES
-    frames = rod.frames(state.z[None], state.p[None], s)[0]
-    stiffness = np.array([torsion, 1.0, 1.0]) / FORCE
-    strains = np.array([[float(each(state)) for each in rod.strains(at)] for at in s])
-    support = np.array([float(rod.support_force(each)(state)) for each in "xyz"])
-    y = np.zeros((PIECES, 13))
-    y[:, :3] = state.shape(s)
-    y[:, 3:7] = Rotation.from_matrix(frames).as_quat(scalar_first=True)
-    y[:, 10:13] = np.einsum("ick,ik->ic", frames, stiffness * strains)
-    y[:, 7:10] = -support
+    y, stiffness = shot(state, (torsion, 1.0, 1.0), PIECES)
+    s = np.arange(PIECES) / PIECES
     y[:, 8] += state["q"] * s
     y[s >= 0.5, 9] -= state["side"]
     turn = [about((0, 0, 1), sign * 0.9) for sign in (1.0, -1.0)]
@@ -76,7 +67,7 @@ def test_states_on_the_way_meet_shooting(result):
     states = result.path.states
     farthest = int(np.abs(states.shape()[:, 50, 2]).argmax())
     for state in (states[farthest], states[farthest - 3]):
-        solved = shot(state, 1.0 / 1.3).solved()
+        solved = aside(state, 1.0 / 1.3).solved()
         s = np.linspace(0.0, 1.0, 9)
         wanted = np.array([solved.place(each) for each in s])
         np.testing.assert_allclose(state.shape(s), wanted, atol=2e-7)
