@@ -1,4 +1,4 @@
-"""Strips bent between clamps that are moved aside or twisted: where they leave their symmetric shape.
+"""Strips bent between clamps that are moved aside or twisted: where they lose their symmetry.
 
 The settings are those of [YuHanna2019]_ (one clamp is moved along the width) and [SanoWada2019]_
 (both clamps are turned about their tangents, against each other), as Kirchhoff rods with

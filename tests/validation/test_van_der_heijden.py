@@ -30,7 +30,7 @@ def buckle(s):
 
 
 def cross_sections(s):
-    """Rotations between places on the buckle: carried along its axis without turning, and twisted evenly."""
+    """Rotations between places on the buckle: carried along without turning, twisted evenly."""
     chords = np.diff(buckle(s), axis=0)
     chords /= np.linalg.norm(chords, axis=1, keepdims=True)
     bends = np.concatenate([1.0 + (chords[:-1] * chords[1:]).sum(axis=1)[:, None],
@@ -101,7 +101,7 @@ def torsion_where_it_leaves(k):
 
 @pytest.mark.parametrize("torsion", [GAMMA, 0.77, 1.0])
 def test_a_bent_round_rod_leaves_its_plane_where_the_closed_form_says(torsion):
-    """Secondary bifurcation of the untwisted rod [HeijdenNeukirch2003]_, from the plane into a loop.
+    """Secondary bifurcation of the untwisted rod [HeijdenNeukirch2003]_, out of the plane.
 
     The condition is derived here (`torsion_where_it_leaves`); with C = B the span is ⅓. Tolerance:
     1.5e-9 of eight elements of degree seven.
