@@ -6,8 +6,7 @@ exactly. An edge that passes a vertex within one spacing is bent to pass through
 
 import numpy as np
 
-from equimorph.array_types import Bool, Float, Int
-from equimorph.arrays import Edges, ItemFlags, ItemValues
+from equimorph.arrays import Bool, Edges, Float, Int, ItemFlags, ItemValues
 
 Places = Float[np.ndarray, "places 2"]
 Jumps = Int[np.ndarray, " edges"]

@@ -7,8 +7,7 @@ from itertools import combinations
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
-from equimorph.array_types import Int
-from equimorph.arrays import CellNumbers, ItemFlags, Items, Points
+from equimorph.arrays import CellNumbers, Int, ItemFlags, Items, Points
 from equimorph.charts.chart import Chart
 from equimorph.charts.coordinates import Coordinates, coordinates_of
 from equimorph.charts.location import Cells, EdgeKind, Found

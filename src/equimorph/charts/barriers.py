@@ -6,8 +6,7 @@ from itertools import pairwise
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
-from equimorph.array_types import Float, Int
-from equimorph.arrays import Facets, ItemValues, Place, Places, Points, Some
+from equimorph.arrays import Facets, Float, Int, ItemValues, Place, Places, Points, Some
 from equimorph.charts.domain import Domain, kinds_along, without_slivers
 from equimorph.charts.location import Cells, EdgeKind, facet_kinds
 from equimorph.charts.preference import Preference

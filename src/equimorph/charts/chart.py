@@ -9,8 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
-from equimorph.array_types import Bool, Float, Int
-from equimorph.arrays import Points
+from equimorph.arrays import Bool, Float, Int, Points
 from equimorph.charts.coordinates import Coordinates, coordinates_of, frames_anywhere
 from equimorph.charts.domain import (
     Domain,

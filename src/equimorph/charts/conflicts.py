@@ -7,8 +7,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import breadth_first_order, dijkstra, maximum_flow
 from scipy.spatial import cKDTree
 
-from equimorph.array_types import Bool, Float, Int
-from equimorph.arrays import Pairs
+from equimorph.arrays import Bool, Float, Int, Pairs
 from equimorph.charts.location import Cells
 from equimorph.manifold.geometry.topology import labels
 from equimorph.manifold.lookup.cell_index import CellIndex

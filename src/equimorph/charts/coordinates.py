@@ -5,8 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from equimorph.array_types import Float, Int
-from equimorph.arrays import Flags, Frames, Lanes, Numbers, Parameters, Rows, Some
+from equimorph.arrays import Flags, Float, Frames, Int, Lanes, Numbers, Parameters, Rows, Some
 from equimorph.equilibria.point_conditions import Values as TargetValues
 from equimorph.equilibria.settle import (
     Guards,

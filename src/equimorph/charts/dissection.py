@@ -6,8 +6,7 @@ from itertools import pairwise
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
-from equimorph.array_types import Bool, Int
-from equimorph.arrays import CellNumbers, ItemValues, Pairs
+from equimorph.arrays import Bool, CellNumbers, Int, ItemValues, Pairs
 from equimorph.charts.atlas import Atlas
 from equimorph.charts.chart import check_cells
 from equimorph.charts.conflicts import conflicts_of, least_cut

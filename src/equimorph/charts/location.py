@@ -6,10 +6,12 @@ from functools import cached_property
 
 import numpy as np
 
-from equimorph.array_types import Bool, Float, Int
 from equimorph.arrays import (
+    Bool,
     Facets,
     Flags,
+    Float,
+    Int,
     Items,
     Lanes,
     Numbers,

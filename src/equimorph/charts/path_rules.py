@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
-from equimorph.array_types import Bool, Float
-from equimorph.arrays import Flags, Lanes, Parameters, Points, Some
+from equimorph.arrays import Bool, Flags, Float, Lanes, Parameters, Points, Some
 from equimorph.charts.location import Found
 from equimorph.charts.rules import Choice, Identity, Rule, first_of_each, highest, lowest, nearest
 from equimorph.charts.score_changes import shares_of_ends

@@ -8,8 +8,7 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 
-from equimorph.array_types import Float, Int
-from equimorph.arrays import CellFlags, CellNumbers, VertexFlags
+from equimorph.arrays import CellFlags, CellNumbers, Float, Int, VertexFlags
 from equimorph.charts.preparation import first_copies
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.geometry.points import are_singular, on_fold

@@ -6,10 +6,11 @@ from itertools import permutations
 
 import numpy as np
 
-from equimorph.array_types import Bool, Float
 from equimorph.arrays import (
+    Bool,
     CellFlags,
     Flags,
+    Float,
     ItemFlags,
     Items,
     ItemValues,

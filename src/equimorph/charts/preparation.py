@@ -4,8 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from equimorph.array_types import Bool, Float, Int
-from equimorph.arrays import Facets, ItemFlags, Items, Pairs, VertexNumbers
+from equimorph.arrays import Bool, Facets, Float, Int, ItemFlags, Items, Pairs, VertexNumbers
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.complex.kept_sets import kept
 from equimorph.manifold.complex.marked_complex import Fabric, fabric_of

@@ -10,8 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
-from equimorph.array_types import Bool, Int
-from equimorph.arrays import Points, VertexFlags
+from equimorph.arrays import Bool, Int, Points, VertexFlags
 from equimorph.charts.barriers import Barrier, barriers_of, gaps_of
 from equimorph.charts.chart import Chart, Charted, PointStatus, check_cells
 from equimorph.charts.coordinates import Coordinates, coordinates_of

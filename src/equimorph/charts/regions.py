@@ -19,7 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from equimorph.array_types import Bool, Float, Int
+from equimorph.arrays import Bool, Float, Int
 from equimorph.charts.arrangement import arrange, cross, outline, sides, winding, winding_raster
 from equimorph.manifold import EquilibriumSet, overturned_cells
 

@@ -8,8 +8,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from equimorph.argument_checks import check_arguments
-from equimorph.array_types import Bool, Float
-from equimorph.arrays import Parameters, Points
+from equimorph.arrays import Bool, Float, Parameters, Points
 from equimorph.charts.location import Found
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet

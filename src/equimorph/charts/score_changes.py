@@ -4,8 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from equimorph.array_types import Float
-from equimorph.arrays import Flags, Lanes, Parameters, Some, Values
+from equimorph.arrays import Flags, Float, Lanes, Parameters, Some, Values
 from equimorph.charts.location import Found
 from equimorph.charts.rules import Scoring
 from equimorph.columns import Columns

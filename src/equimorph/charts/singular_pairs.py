@@ -15,8 +15,7 @@ from functools import cached_property
 import numpy as np
 from scipy.spatial import cKDTree
 
-from equimorph.array_types import Float
-from equimorph.arrays import Frames, Items, Place, Places, Points
+from equimorph.arrays import Float, Frames, Items, Place, Places, Points
 from equimorph.charts.coordinates import Coordinates, solve_on_the_set
 from equimorph.charts.location import Cells, Found
 from equimorph.manifold.geometry.setting import embed

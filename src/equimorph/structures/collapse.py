@@ -4,8 +4,7 @@ from abc import abstractmethod
 
 import numpy as np
 
-from equimorph.array_types import Float
-from equimorph.arrays import Lanes, Parameters, Values
+from equimorph.arrays import Float, Lanes, Parameters, Values
 from equimorph.model import Constraint, Descriptor, remember_call
 from equimorph.structures.contract import Structure
 

@@ -4,8 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from equimorph.array_types import Float, Int
-from equimorph.arrays import Cells, EdgeFlags, ItemFlags, Place, Places
+from equimorph.arrays import Cells, EdgeFlags, Float, Int, ItemFlags, Place, Places
 from equimorph.manifold.geometry.simplices import barycentric
 from equimorph.manifold.geometry.topology import keys_of, rows_of
 from equimorph.tolerances import IN_BOX

@@ -5,8 +5,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from equimorph.array_types import Bool, Float, Int
-from equimorph.arrays import EdgeFlags, ItemFlags, Items, ItemValues, Pairs, Some, VertexFlags
+from equimorph.arrays import (
+    Bool,
+    EdgeFlags,
+    Float,
+    Int,
+    ItemFlags,
+    Items,
+    ItemValues,
+    Pairs,
+    Some,
+    VertexFlags,
+)
 from equimorph.manifold.complex.edge_points import Places, on_edges
 from equimorph.manifold.complex.marked_complex import Fabric, edges_of
 from equimorph.manifold.complex.shared_edges import first_copies, with_copies

@@ -5,8 +5,7 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from equimorph.array_types import Bool, Float, Int
-from equimorph.arrays import CellFlags, CellNumbers, Cells, VertexNumbers
+from equimorph.arrays import Bool, CellFlags, CellNumbers, Cells, Float, Int, VertexNumbers
 from equimorph.manifold.complex.audit import Audit
 from equimorph.manifold.complex.base_mesh import BaseMesh
 from equimorph.manifold.complex.equilibrium_set import (

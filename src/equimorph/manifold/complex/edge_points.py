@@ -6,8 +6,7 @@ from functools import partial
 
 import numpy as np
 
-from equimorph.array_types import Bool, Float, Int
-from equimorph.arrays import ItemFlags, Items, ItemValues, Pairs, Some
+from equimorph.arrays import Bool, Float, Int, ItemFlags, Items, ItemValues, Pairs, Some
 from equimorph.equilibria.settle import lower_index
 from equimorph.linalg.lanes import results_of
 from equimorph.manifold.complex.marked_complex import TETRAHEDRA, Fabric, FacetMark, held_parameters

@@ -8,8 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
-from equimorph.array_types import Float, Int
-from equimorph.arrays import CellNumbers, Cells, Flags, Numbers, VertexNumbers
+from equimorph.arrays import CellNumbers, Cells, Flags, Float, Int, Numbers, VertexNumbers
 from equimorph.errors import InputError
 from equimorph.manifold.complex.audit import Audit
 from equimorph.manifold.complex.base_mesh import BaseMesh

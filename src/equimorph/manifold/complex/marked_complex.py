@@ -12,12 +12,13 @@ from itertools import combinations
 
 import numpy as np
 
-from equimorph.array_types import Float, Int
 from equimorph.arrays import (
     CellFlags,
     CellNumbers,
     Cells,
     Facets,
+    Float,
+    Int,
     ItemFlags,
     Items,
     Triples,

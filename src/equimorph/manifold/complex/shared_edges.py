@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from equimorph.array_types import Bool, Int
+from equimorph.arrays import Bool, Int
 from equimorph.manifold.complex.marked_complex import Fabric, FacetMark, edges_of
 from equimorph.manifold.complex.vertices import Vertices, vertices_of
 from equimorph.manifold.geometry.topology import keys_of

@@ -5,8 +5,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from equimorph.array_types import Float
-from equimorph.arrays import ItemFlags, VertexFlags, VertexNumbers
+from equimorph.arrays import Float, ItemFlags, VertexFlags, VertexNumbers
 from equimorph.columns import Columns
 from equimorph.manifold.geometry.crossings import crossing_frames
 from equimorph.manifold.geometry.exact_points import Corrected

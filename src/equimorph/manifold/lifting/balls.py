@@ -12,8 +12,7 @@ from itertools import product
 
 import numpy as np
 
-from equimorph.array_types import Bool, Float, Int
-from equimorph.arrays import Items
+from equimorph.arrays import Bool, Float, Int, Items
 from equimorph.manifold.complex.base_mesh import BaseMesh
 from equimorph.manifold.geometry.exact_points import Pinned, Span, middles, pin, pin_crossings
 from equimorph.manifold.geometry.points import Points, VertexKind

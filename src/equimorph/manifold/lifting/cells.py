@@ -5,8 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from equimorph.array_types import Bool, Float, Int
-from equimorph.arrays import CellNumbers, Facets, Items
+from equimorph.arrays import Bool, CellNumbers, Facets, Float, Int, Items
 from equimorph.manifold.complex.description import Complex, Frame, Lifting, describe
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.manifold.geometry.points import VertexKind

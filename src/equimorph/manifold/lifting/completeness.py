@@ -9,8 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from equimorph.array_types import Float, Int
-from equimorph.arrays import Lanes
+from equimorph.arrays import Float, Int, Lanes
 from equimorph.equilibria import search_points
 from equimorph.equilibria.random_search import Ground, Pools
 from equimorph.equilibria.settle import Guards, free_directions, settle

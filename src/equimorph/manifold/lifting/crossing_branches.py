@@ -6,8 +6,7 @@ lifted in a step that did not notice the crossing, it is traced again in finer s
 
 import numpy as np
 
-from equimorph.array_types import Float, Int
-from equimorph.arrays import Items
+from equimorph.arrays import Float, Int, Items
 from equimorph.equilibria import ParameterLine, TraceOptions
 from equimorph.equilibria.critical import null_border
 from equimorph.equilibria.steps import Front, step_along

@@ -7,7 +7,7 @@ their chord would close the strip around the vertex; yet both crossings lead on 
 
 import numpy as np
 
-from equimorph.array_types import Bool
+from equimorph.arrays import Bool
 from equimorph.manifold.geometry.crossings import crossing_directions
 from equimorph.manifold.geometry.exact_points import pin_crossings
 from equimorph.manifold.lifting.cells import Cells

@@ -11,8 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import brentq
 
-from equimorph.array_types import Float
-from equimorph.arrays import ItemValues
+from equimorph.arrays import Float, ItemValues
 from equimorph.equilibria.critical import Critical, null_border
 from equimorph.equilibria.settle import lower_index
 from equimorph.manifold.geometry.exact_points import Aim, Pinned, correct_points, pin_crossings

@@ -9,8 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from equimorph.array_types import Float, Int
-from equimorph.arrays import Some
+from equimorph.arrays import Float, Int, Some
 from equimorph.equilibria.descents import descend
 from equimorph.equilibria.gradient_flow import Ending
 from equimorph.equilibria.settle import lower_index

@@ -4,8 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from equimorph.array_types import Bool, Float, Int
-from equimorph.arrays import Items, Places, Triples
+from equimorph.arrays import Bool, Float, Int, Items, Places, Triples
 from equimorph.manifold.geometry.exact_points import pin
 from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.setting import embed

@@ -7,8 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from equimorph.array_types import Bool, Float, Int
-from equimorph.arrays import Flags, ItemFlags, Items, Lanes, Numbers
+from equimorph.arrays import Bool, Flags, Float, Int, ItemFlags, Items, Lanes, Numbers
 from equimorph.equilibria import Guards, ParameterLine, TraceOptions, settle
 from equimorph.equilibria.curves import squared_length
 from equimorph.equilibria.kernels import FIRST_SHARE, LEAST_COSINE, MULTIPLIER_WEIGHT

@@ -10,8 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from equimorph.array_types import Bool, Float, Int
-from equimorph.arrays import Flags, Pairs, Parameters, Places, Some, Values
+from equimorph.arrays import Bool, Flags, Float, Int, Pairs, Parameters, Places, Some, Values
 from equimorph.columns import Columns
 from equimorph.manifold.geometry.exact_points import pin
 from equimorph.manifold.geometry.points import VertexKind

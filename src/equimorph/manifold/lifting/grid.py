@@ -9,8 +9,7 @@ from itertools import permutations
 
 import numpy as np
 
-from equimorph.array_types import Float, Int
-from equimorph.arrays import Items, Place, Some
+from equimorph.arrays import Float, Int, Items, Place, Some
 from equimorph.manifold.complex.base_mesh import BaseMesh, mesh_of
 from equimorph.model import Box
 

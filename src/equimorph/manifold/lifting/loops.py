@@ -10,8 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from equimorph.array_types import Bool, Int
-from equimorph.arrays import Items, Some
+from equimorph.arrays import Bool, Int, Items, Some
 from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.geometry.tangents import frames_in_embedding, tangent_frames

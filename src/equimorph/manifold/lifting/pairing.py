@@ -5,8 +5,7 @@ from enum import IntEnum
 
 import numpy as np
 
-from equimorph.array_types import Float, Int
-from equimorph.arrays import Items
+from equimorph.arrays import Float, Int, Items
 from equimorph.columns import Columns
 from equimorph.equilibria import ParameterLine
 from equimorph.manifold.complex.base_mesh import BaseMesh

@@ -9,7 +9,7 @@ from functools import cache, lru_cache
 
 import numpy as np
 
-from equimorph.array_types import Bool, Float, Int
+from equimorph.arrays import Bool, Float, Int
 from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.simplices import plane_bases
 from equimorph.manifold.lifting.loops import Polygon

@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from equimorph.array_types import Bool, Float, Int
-from equimorph.arrays import Items, Places, Some
+from equimorph.arrays import Bool, Float, Int, Items, Places, Some
 from equimorph.equilibria import Guards, ParameterLine, TraceOptions, search_points, settle
 from equimorph.equilibria.kernels import MULTIPLIER_WEIGHT
 from equimorph.equilibria.trace import trace

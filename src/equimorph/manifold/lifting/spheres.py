@@ -9,8 +9,7 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from equimorph.array_types import Bool, Float, Int
-from equimorph.arrays import ItemFlags, Items, Pairs, Triples
+from equimorph.arrays import Bool, Float, Int, ItemFlags, Items, Pairs, Triples
 from equimorph.manifold.complex.base_mesh import BaseMesh
 from equimorph.manifold.geometry.simplices import volumes
 from equimorph.manifold.geometry.topology import adjacency, distinct, keys_of, labels, orientation

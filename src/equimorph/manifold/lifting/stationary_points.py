@@ -13,8 +13,7 @@ from itertools import combinations_with_replacement, product
 
 import numpy as np
 
-from equimorph.array_types import Float, Int
-from equimorph.arrays import Flags, Lanes, Parameters, Places, Some, Values
+from equimorph.arrays import Flags, Float, Int, Lanes, Parameters, Places, Some, Values
 from equimorph.columns import Columns
 from equimorph.equilibria.critical import null_border
 from equimorph.equilibria.settle import free_directions

@@ -7,8 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from equimorph.array_types import Bool, Float
-from equimorph.arrays import CellFlags, Place, Some
+from equimorph.arrays import Bool, CellFlags, Float, Place, Some
 from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.setting import Setting
 from equimorph.manifold.lifting.cells import Cells, Seen

@@ -7,8 +7,7 @@ from typing import ClassVar
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
-from equimorph.array_types import Float
-from equimorph.arrays import Lanes, Parameters, Values, Velocity
+from equimorph.arrays import Float, Lanes, Parameters, Values, Velocity
 from equimorph.errors import InputError
 from equimorph.model import Descriptor, remember_call
 from equimorph.structures.contract import Written

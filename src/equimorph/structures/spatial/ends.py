@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
-from equimorph.array_types import Float
+from equimorph.arrays import Float
 from equimorph.errors import InputError
 from equimorph.structures.rod.ends import FREE, HELD, Axis, Holding, Support, stiffness
 

@@ -6,8 +6,7 @@ from functools import cached_property
 import numpy as np
 from numpy.polynomial import legendre
 
-from equimorph.array_types import Float
-from equimorph.arrays import Lanes, Parameters, Values
+from equimorph.arrays import Float, Lanes, Parameters, Values
 from equimorph.linalg.lanes import over_lanes
 from equimorph.structures.spatial.field_kernels import fields_lanes
 from equimorph.structures.spatial.mechanics import SpatialMechanics, field_tables, pairs_of

@@ -10,8 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from equimorph.array_types import Float
-from equimorph.arrays import Flags, Lanes, Parameters, Scalars, Values
+from equimorph.arrays import Flags, Float, Lanes, Parameters, Scalars, Values
 from equimorph.structures.contract import Symmetry
 from equimorph.structures.equations import Direction
 from equimorph.structures.rod.mechanics import RodMechanics

@@ -4,8 +4,7 @@ from functools import cache, cached_property, partial
 
 import numpy as np
 
-from equimorph.array_types import Float, Int
-from equimorph.arrays import Entries, Lanes, Parameters, Sides, Values
+from equimorph.arrays import Entries, Float, Int, Lanes, Parameters, Sides, Values
 from equimorph.linalg import Border, BorderedSolution
 from equimorph.linalg.condensed import PIVOT_GUARD
 from equimorph.linalg.dense import no_border

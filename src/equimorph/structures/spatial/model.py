@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from equimorph.array_types import Float
+from equimorph.arrays import Float
 from equimorph.errors import InputError
 from equimorph.structures.rod import terms
 from equimorph.structures.rod.discretisation import Mesh

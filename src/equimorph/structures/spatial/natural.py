@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from equimorph.array_types import Bool, Float
-from equimorph.arrays import Flags, Lanes, Parameters, Values
+from equimorph.arrays import Bool, Flags, Float, Lanes, Parameters, Values
 from equimorph.errors import InputError
 from equimorph.structures.rod.measured import Measured
 from equimorph.structures.rod.natural import Outcome, continue_ends

@@ -4,8 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from equimorph.array_types import Float
-from equimorph.arrays import Flags, Lanes, Parameters
+from equimorph.arrays import Flags, Float, Lanes, Parameters
 from equimorph.errors import InputError
 from equimorph.structures.rod.natural import Part, follow
 from equimorph.structures.spatial.ends import PLACES

@@ -16,8 +16,7 @@ from functools import cached_property, partial
 
 import numpy as np
 
-from equimorph.array_types import Float
-from equimorph.arrays import Flags, Lanes, Parameters, Sides, Values
+from equimorph.arrays import Flags, Float, Lanes, Parameters, Sides, Values
 from equimorph.linalg import BorderedSolution
 from equimorph.linalg.dense import multiply, no_border
 from equimorph.structures.equations import Advance, AnyBorder, Direction, Shift

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from equimorph.array_types import Float
+from equimorph.arrays import Float
 from equimorph.errors import InputError
 from equimorph.structures.spatial.model import ANGLES, SpatialModel
 from equimorph.tolerances import SAME_NUMBER

@@ -10,8 +10,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from equimorph.array_types import Float
-from equimorph.arrays import Flags
+from equimorph.arrays import Flags, Float
 
 Quaternions = Float[np.ndarray, "... 4"]
 Jet = Float[np.ndarray, "parts ..."]

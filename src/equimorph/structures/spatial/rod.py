@@ -7,8 +7,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
-from equimorph.array_types import Float
-from equimorph.arrays import Flags, Lanes, Parameters, Values
+from equimorph.arrays import Flags, Float, Lanes, Parameters, Values
 from equimorph.errors import InputError
 from equimorph.model import Drawing, parameter_vector
 from equimorph.structures.discrete import correct_at_parameters

@@ -11,8 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from equimorph.array_types import Float
-from equimorph.arrays import ItemFlags, Items, Some
+from equimorph.arrays import Float, ItemFlags, Items, Some
 from equimorph.equilibria import settle
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.complex.kept_sets import from_cache

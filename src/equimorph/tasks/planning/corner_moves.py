@@ -4,8 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from equimorph.array_types import Bool, Float, Int
-from equimorph.arrays import Values
+from equimorph.arrays import Bool, Float, Int, Values
 from equimorph.equilibria import Guards, settle
 from equimorph.model import Box
 from equimorph.structures import States, join_states

@@ -14,8 +14,7 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import breadth_first_order, minimum_spanning_tree
 
-from equimorph.array_types import Float, Int
-from equimorph.arrays import Facets, Items, ItemValues, Pairs, Some
+from equimorph.arrays import Facets, Float, Int, Items, ItemValues, Pairs, Some
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.complex.kept_sets import from_cache
 from equimorph.manifold.geometry.points import VertexKind

@@ -11,8 +11,7 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import breadth_first_order, minimum_spanning_tree
 
-from equimorph.array_types import Bool, Float, Int
-from equimorph.arrays import Edges
+from equimorph.arrays import Bool, Edges, Float, Int
 
 Triangles = Int[np.ndarray, "triangles 3"]
 Values = Int[np.ndarray, "edges holes"]

@@ -7,8 +7,7 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components, dijkstra
 
-from equimorph.array_types import Bool, Float, Int
-from equimorph.arrays import Flags, Lanes, Parameters, Some, Values
+from equimorph.arrays import Bool, Flags, Float, Int, Lanes, Parameters, Some, Values
 from equimorph.equilibria import ParameterLine, TraceOptions
 from equimorph.equilibria.soft_modes import metric_length
 from equimorph.equilibria.trace import Traces, trace

@@ -9,7 +9,7 @@ import numpy as np
 
 from equimorph.argument_checks import check_arguments
 from equimorph.argument_kinds import ANYTHING, short
-from equimorph.array_types import Float, Int
+from equimorph.arrays import Float, Int
 from equimorph.errors import InputError, suggestion
 from equimorph.model import Constraint, Descriptor, Rates, Schedule, names_of
 from equimorph.structures import States, Structure, stability_margin

@@ -4,8 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from equimorph.array_types import Float, Int
-from equimorph.arrays import Lanes, Parameters, Values
+from equimorph.arrays import Float, Int, Lanes, Parameters, Values
 from equimorph.model import Box, Constraint
 from equimorph.structures import State, States
 

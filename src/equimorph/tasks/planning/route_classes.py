@@ -7,8 +7,7 @@ from heapq import heappop, heappush
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
-from equimorph.array_types import Float, Int
-from equimorph.arrays import Edges
+from equimorph.arrays import Edges, Float, Int
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Constraint, Descriptor
 from equimorph.structures import State, States

@@ -6,8 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
-from equimorph.array_types import Bool, Float, Int
-from equimorph.arrays import Values
+from equimorph.arrays import Bool, Float, Int, Values
 from equimorph.equilibria import way_points
 from equimorph.errors import InputError
 from equimorph.model import Box, Constraint, Descriptor, position

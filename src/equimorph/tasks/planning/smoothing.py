@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
-from equimorph.array_types import Float
+from equimorph.arrays import Float
 from equimorph.equilibria import lift
 from equimorph.errors import InputError
 from equimorph.model import Constraint, Descriptor, Spline, names_of

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 
-from equimorph.array_types import Float, Int
+from equimorph.arrays import Float, Int
 from equimorph.equilibria import Landing, Path, lift, snap_landing
 from equimorph.manifold import EquilibriumSet, Snap, snap_graph
 from equimorph.manifold.complex.kept_sets import from_cache

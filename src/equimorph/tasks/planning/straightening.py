@@ -5,8 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from equimorph.array_types import Bool, Int
-from equimorph.arrays import Flags, Lanes, Parameters
+from equimorph.arrays import Bool, Flags, Int, Lanes, Parameters
 from equimorph.equilibria import Guards, ParameterLine, TraceOptions, settle
 from equimorph.equilibria.trace import trace
 from equimorph.equilibria.trace_options import EventCode
