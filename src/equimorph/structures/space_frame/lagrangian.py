@@ -7,50 +7,26 @@ the multipliers. As for rods in space, ½ k m (|q|² − 1)² keeps lengths at 1
 
 import numpy as np
 
-from equimorph.arrays import Float, Int, Lanes, Parameters, Scalars, Values
+from equimorph.arrays import Float, Lanes, Parameters, Scalars, Values
 from equimorph.errors import InputError
 from equimorph.structures.equations import Direction
 from equimorph.structures.space_frame.model import SpatialFrameModel
 from equimorph.structures.spatial.quaternions import (
     FRAME,
-    RIGHT,
     Jet,
     bilinear,
-    compose,
+    conjugate,
+    dot,
+    element_slopes,
+    gathered,
     normalised,
     product,
+    strains,
+    turn_about,
 )
 
 BLOCK = 16
 """Lanes computed together: their arrays stay in the cache."""
-
-
-def dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Products summed over the last axis."""
-    return np.asarray((a * b).sum(axis=-1))
-
-
-def turn_about(angle: Jet, axes: Float[np.ndarray, "... 3"]) -> Jet:
-    """Quaternions exp(a φ/2) of angles about unit axes."""
-    c, s = np.cos(0.5 * angle[0]), np.sin(0.5 * angle[0])
-    out = np.zeros((*angle.shape, 4), angle.dtype)
-    out[..., 0] = compose(c, -0.5 * s, -0.25 * c, angle)
-    out[..., 1:] = compose(s, 0.5 * c, -0.25 * s, angle)[..., None] * axes
-    return out
-
-
-def gathered(
-    values: Float[np.ndarray, "*batch some width"], at: Int[np.ndarray, " some"], count: int
-) -> Float[np.ndarray, "*batch count width"]:
-    """Sum of the rows that belong to each of `count` places."""
-    out = np.zeros((count, *values.shape[:-2], values.shape[-1]), values.dtype)
-    np.add.at(out, at, np.moveaxis(values, -2, 0))
-    return np.moveaxis(out, 0, -2)
-
-
-def conjugated(q: np.ndarray) -> np.ndarray:
-    """Inverse rotations."""
-    return np.asarray(q * np.array([1.0, -1.0, -1.0, -1.0]))
 
 
 class SpatialFrameLagrangian:
@@ -121,10 +97,7 @@ class SpatialFrameLagrangian:
 
     def strains(self, w: Jet) -> tuple[Jet, Jet, Jet]:
         """w e_k and w' at the points, and the strains v on fixed axes."""
-        local = w[:, :, self.model.nodes]
-        turned = np.einsum("kab,...b->...ka", RIGHT, local)
-        moved = np.einsum("eij,pleja->pleia", self._slopes, local)
-        return turned, moved, 2.0 * bilinear(_apply, turned, moved)
+        return strains(self._slopes, w[:, :, self.model.nodes])
 
     def actuated(self, y: Jet) -> tuple[Jet, Jet]:
         """Strains of the cross-sections, and elongations, that are free of stress, by piece."""
@@ -171,13 +144,9 @@ class SpatialFrameLagrangian:
         """Gradient of L by unit quaternions at the points, element by element."""
         turned, moved, v = self.strains(w)
         weights = self.model.weights[..., None]
-        moment = 2.0 * weights * self.point_moments(v, y)
         pull, _, stretch = self.tensions(w, y)
-        own = -np.einsum("kab,...b->...ka", RIGHT, moved)
-        local = bilinear(_combine, moment, own)
-        local = local - weights * bilinear(_scale, stretch, pull)
-        spread = bilinear(_combine, moment, turned)
-        return np.asarray(local + np.einsum("eij,pleia->pleja", self._slopes, spread))
+        local = element_slopes(self._slopes, turned, moved, weights * self.point_moments(v, y))
+        return np.asarray(local - weights * bilinear(_scale, stretch, pull))
 
     def slope(self, w: Jet, y: Jet) -> Jet:
         """Gradient of L by unit quaternions at all nodes."""
@@ -274,7 +243,7 @@ class SpatialFrameLagrangian:
             [product(part, np.broadcast_to(axes, part.shape)) for part in w[:, :, model.hinged]]
         )
         by_angle = 0.5 * bilinear(dot, here, rate)
-        leaning = bilinear(product, here, conjugated(turned))
+        leaning = bilinear(product, here, conjugate(turned))
         slope += gathered(leaning, model.parents, len(model.turning))
         return by_angle
 
@@ -305,14 +274,6 @@ class SpatialFrameLagrangian:
         units = np.eye(4)[1:]
         turned = [product(np.broadcast_to(unit, w[0].shape), w[0]) for unit in units]
         return np.stack([0.5 * dot(each, slope[0]) for each in turned], axis=-1)
-
-
-def _apply(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    return np.asarray(np.einsum("...ka,...a->...k", a, b))
-
-
-def _combine(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    return np.asarray(np.einsum("...k,...ka->...a", a, b))
 
 
 def _scale(a: np.ndarray, b: np.ndarray) -> np.ndarray:

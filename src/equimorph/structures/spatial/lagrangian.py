@@ -18,14 +18,18 @@ from equimorph.structures.rod.reflections import Images, Reflection, find_symmet
 from equimorph.structures.spatial.model import SpatialModel
 from equimorph.structures.spatial.quaternions import (
     FRAME,
-    RIGHT,
     Jet,
+    apply,
     are_near,
     bilinear,
     clamp_rotation,
+    combine,
+    element_slopes,
     exponential,
+    gathered,
     normalised,
     product,
+    strains,
 )
 
 LENGTH_STIFFNESS = 100.0
@@ -87,11 +91,7 @@ class SpatialLagrangian(RodMechanics):
 
     def element_strains(self, q: Jet) -> tuple[Jet, Jet, Jet]:
         """q e_k and q' at the nodes of every element, and u."""
-        local = q[:, :, self.mesh.element_nodes]
-        turned = np.einsum("kab,...b->...ka", RIGHT, local)
-        moved = np.einsum("eij,pleja->pleia", self.slopes, local)
-        strain = 2.0 * bilinear(lambda a, b: np.einsum("...ka,...a->...k", a, b), turned, moved)
-        return turned, moved, strain
+        return strains(self.slopes, q[:, :, self.mesh.element_nodes])
 
     def section_forces(self, q: Jet, y: Jet) -> tuple[Jet, Jet]:
         """∂a_k/∂q and a_k: of the force on the cross-section, on its axes."""
@@ -102,8 +102,7 @@ class SpatialLagrangian(RodMechanics):
             return np.asarray(np.einsum("...c,kcab,...b->...ka", f, FRAME, at, optimize=True))
 
         slope = 2.0 * bilinear(pull, force, local)
-        axial = 0.5 * bilinear(lambda a, b: np.einsum("...ka,...a->...k", a, b), slope, local)
-        return slope, axial
+        return slope, 0.5 * bilinear(apply, slope, local)
 
     def stretches(self, axial: Jet, y: Jet) -> Jet:
         """∂L/∂a_k over the weights: 1 + extension, and shears."""
@@ -136,25 +135,14 @@ class SpatialLagrangian(RodMechanics):
         """Gradient of L by unit quaternions at all nodes."""
         turned, moved, strain = self.element_strains(q)
         weights = self.weights[..., None]
-        moment = 2.0 * weights * self.section_moments(strain, y)
+        moment = weights * self.section_moments(strain, y)
         pull, axial = self.section_forces(q, y)
         stretch = weights * self.stretches(axial, y)
-
-        def combine(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-            return np.asarray(np.einsum("...k,...ka->...a", a, b))
-
-        own = -np.einsum("kab,...b->...ka", RIGHT, moved)
-        local = bilinear(combine, moment, own) + bilinear(combine, stretch, pull)
-        spread = bilinear(combine, moment, turned)
-        local = local + np.einsum("eij,pleia->pleja", self.slopes, spread)
-        return self.assemble(local)
-
-    def assemble(self, local: Float[np.ndarray, "... elements order 4"]) -> np.ndarray:
-        """Sum what belongs to the same node."""
-        out = np.zeros((*local.shape[:-3], len(self.mesh.nodes), 4), local.dtype)
-        for e, nodes in enumerate(self.mesh.element_nodes):
-            out[..., nodes, :] += local[..., e, :, :]
-        return out
+        local = element_slopes(self.slopes, turned, moved, moment)
+        local = local + bilinear(combine, stretch, pull)
+        nodes = self.mesh.element_nodes
+        flat = local.reshape(*local.shape[:2], nodes.size, 4)
+        return gathered(flat, nodes.ravel(), len(self.mesh.nodes))
 
     def by_scalars(self, q: Jet, y: Jet) -> Jet:
         """∂L/∂y at fixed rotations."""
@@ -168,7 +156,7 @@ class SpatialLagrangian(RodMechanics):
             return np.asarray(np.einsum("...a,kcab,...b->...kc", a, FRAME, b, optimize=True))
 
         frames = bilinear(turn, local, local)
-        pointing = bilinear(lambda a, b: np.einsum("...k,...kc->...c", a, b), stretch, frames)
+        pointing = bilinear(combine, stretch, frames)
         out = np.einsum("pleic,seic->pls", pointing, model.force)
         out = out - np.einsum("pleik,seik->pls", weights * strain, model.moment)
         twisting = 0.5 * self.weights * bilinear(np.multiply, strain[..., 0], strain[..., 0])

@@ -19,9 +19,9 @@ from equimorph.structures.spatial.quaternions import (
     RIGHT,
     clamp_rotation,
     conjugate,
-    half_turn,
     matrices,
     product,
+    turn_about,
 )
 from equimorph.structures.states import State
 
@@ -168,7 +168,7 @@ def planar_guess(mechanics: SpatialMechanics, state: Any) -> Lanes:
     z, p = state.z[None], state.p[None]
     nodes = mechanics.mesh.nodes[mechanics.model.unknown_nodes]
     angles = rod.fields(z, p, nodes)[:, :, 0]
-    q = half_turn(angles[None], 2)[0]
+    q = turn_about(angles[None], np.array([0.0, 0.0, 1.0]))[0]
     along = np.append(rod.mechanics.support_forces(z, p)[0], 0.0)
     m = mechanics.constraints
     held = mechanics.model.reaction[:, :m]  # which coordinate each multiplier belongs to

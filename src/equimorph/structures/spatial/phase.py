@@ -64,30 +64,12 @@ class PinnedMechanics(SpatialMechanics):
     def solve(
         self, z: Lanes, p: Parameters, rhs: Sides, border: AnyBorder = None, shift: Shift = None
     ) -> BorderedSolution:
-        """Solve with F_z − shift·mass, bordered."""
-        own = self.equations(z, p, self._along(z, p))[1]
-        return self._solve(own, z, p, rhs, border, shift)
+        """Solve with F_z − shift·mass, bordered: that of the rod itself, with two borders more.
 
-    def _along(self, z: Lanes, p: Parameters) -> Direction:
-        """The direction of μ."""
-        along = np.zeros_like(z)
-        along[:, -1] = 1.0
-        return along, np.zeros_like(p)
-
-    def _solve(
-        self,
-        own: Lanes,
-        z: Lanes,
-        p: Parameters,
-        rhs: Sides,
-        border: AnyBorder = None,
-        shift: Shift = None,
-    ) -> BorderedSolution:
-        """The solve of the rod without the condition, with two borders more.
-
-        That of the condition, `own` = ∂F/∂μ; and that which takes out a spring against the turn of
-        one cross-section about the axis, with which F_z of the rod itself is regular.
+        That of the condition, ∂F/∂μ; and that which takes out a spring against the turn of one
+        cross-section about the axis, with which F_z of the rod itself is regular.
         """
+        own = self.equations(z, p, self._along(z, p))[1]
         around = no_border(len(z), self.size) if border is None else border
         springs, turn = self._springs(z)
         columns, rows = (
@@ -109,6 +91,12 @@ class PinnedMechanics(SpatialMechanics):
         )
         found = replace(found, x=np.delete(found.x, self.size, axis=-1))
         return self.pivot(found, z, p, rhs, around, shift)
+
+    def _along(self, z: Lanes, p: Parameters) -> Direction:
+        """The direction of μ."""
+        along = np.zeros_like(z)
+        along[:, -1] = 1.0
+        return along, np.zeros_like(p)
 
     @cached_property
     def bare(self) -> SpatialMechanics:

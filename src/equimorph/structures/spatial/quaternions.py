@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from equimorph.arrays import Flags, Float
+from equimorph.arrays import Flags, Float, Int
 
 Quaternions = Float[np.ndarray, "... 4"]
 Jet = Float[np.ndarray, "parts ..."]
@@ -109,24 +109,67 @@ def compose(value: np.ndarray, first: np.ndarray, second: np.ndarray, inner: Jet
     return np.stack(parts)
 
 
-def half_turn(angle: Jet, axis: int) -> Jet:
-    """Rotations exp(e_k angle/2) about axis k = 0, 1, 2 as a jet of quaternions."""
+def turn_about(angle: Jet, axes: Float[np.ndarray, "... 3"]) -> Jet:
+    """Quaternions exp(a φ/2) of angles about unit axes."""
     c, s = np.cos(0.5 * angle[0]), np.sin(0.5 * angle[0])
-    out = np.zeros((*angle.shape, 4))
+    out = np.zeros((*angle.shape, 4), angle.dtype)
     out[..., 0] = compose(c, -0.5 * s, -0.25 * c, angle)
-    out[..., 1 + axis] = compose(s, 0.5 * c, -0.25 * s, angle)
+    out[..., 1:] = compose(s, 0.5 * c, -0.25 * s, angle)[..., None] * axes
     return out
 
 
 def clamp_rotation(angles: Float[np.ndarray, "parts ... 3"]) -> Jet:
     """Rotation exp(e₃ a/2) exp(e₂ b/2) exp(e₁ τ/2) of a clamp from its angles (a, b, τ)."""
-    turns = [half_turn(angles[..., k], axis) for k, axis in enumerate((2, 1, 0))]
+    turns = [turn_about(angles[..., k], np.eye(3)[2 - k]) for k in range(3)]
     return bilinear(product, bilinear(product, turns[0], turns[1]), turns[2])
+
+
+def dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Products summed over the last axis."""
+    return np.asarray((a * b).sum(axis=-1))
+
+
+def apply(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Products of rows with vectors."""
+    return np.asarray(np.einsum("...ka,...a->...k", a, b))
+
+
+def combine(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Sums of rows with factors."""
+    return np.asarray(np.einsum("...k,...ka->...a", a, b))
+
+
+def strains(
+    slopes: Float[np.ndarray, "elements order order"],
+    q: Float[np.ndarray, "parts lanes elements order 4"],
+) -> tuple[Jet, Jet, Jet]:
+    """q e_k and q' at the nodes of every element, and the strains 2 (q e_k)·q'."""
+    turned = np.einsum("kab,...b->...ka", RIGHT, q)
+    moved = np.einsum("eij,pleja->pleia", slopes, q)
+    return turned, moved, 2.0 * bilinear(apply, turned, moved)
+
+
+def element_slopes(
+    slopes: Float[np.ndarray, "elements order order"], turned: Jet, moved: Jet, moment: Jet
+) -> Jet:
+    """Gradient of a function of the strains by q at the nodes, from half that by the strains."""
+    local = bilinear(combine, 2.0 * moment, -np.einsum("kab,...b->...ka", RIGHT, moved))
+    spread = bilinear(combine, 2.0 * moment, turned)
+    return np.asarray(local + np.einsum("eij,pleia->pleja", slopes, spread))
+
+
+def gathered(
+    values: Float[np.ndarray, "*batch some width"], at: Int[np.ndarray, " some"], count: int
+) -> Float[np.ndarray, "*batch count width"]:
+    """Sum of the rows that belong to each of `count` places."""
+    out = np.zeros((count, *values.shape[:-2], values.shape[-1]), values.dtype)
+    np.add.at(out, at, np.moveaxis(values, -2, 0))
+    return np.moveaxis(out, 0, -2)
 
 
 def normalised(q: Jet) -> tuple[Jet, Jet, Jet]:
     """q/|q|, 1/|q| and |q|² of quaternions as jets."""
-    square = bilinear(lambda a, b: (a * b).sum(axis=-1), q, q)
+    square = bilinear(dot, q, q)
     rho = square[0]
     inverse = compose(rho**-0.5, -0.5 * rho**-1.5, 0.75 * rho**-2.5, square)
     return bilinear(lambda a, b: a[..., None] * b, inverse, q), inverse, square
