@@ -11,7 +11,7 @@ On the axis ξ = 0, there is nothing to pin, and the condition is void: μ = 0 s
 See docs/decisions.md, "Orbits".
 """
 
-from dataclasses import fields, replace
+from dataclasses import replace
 from functools import cached_property, partial
 
 import numpy as np
@@ -269,8 +269,7 @@ class OrbitMechanics(SpatialMechanics):
         if there.all():
             return found
         rest = super().advance(*(each[~there] for each in (z, p, dp, row, corner, defect)))
-        return Advance(*(_merge(there, getattr(found, each.name), getattr(rest, each.name))
-                         for each in fields(Advance)))  # fmt: skip
+        return Advance(**_merge(there, vars(found), vars(rest)))
 
     def solve(
         self, z: Lanes, p: Parameters, rhs: Sides, border: AnyBorder = None, shift: Shift = None
@@ -296,8 +295,7 @@ class OrbitMechanics(SpatialMechanics):
         outer = None if border is None else tuple(each[~there] for each in border)
         rest = super().solve(z[~there], p[~there], rhs[~there], outer,
                              None if shift is None else shift[~there])  # fmt: skip
-        return BorderedSolution(*(_merge(there, getattr(found, each.name), getattr(rest, each.name))
-                                  for each in fields(BorderedSolution)))  # fmt: skip
+        return BorderedSolution(**_merge(there, vars(found), vars(rest)))
 
     def _turn_parts(
         self,
@@ -322,8 +320,12 @@ def _dot(a: Lanes, b: Lanes) -> Values:
     return np.asarray(np.einsum("ln,ln->l", a, b))
 
 
-def _merge(there: Flags, found: np.ndarray, rest: np.ndarray) -> np.ndarray:
+def _merge(
+    there: Flags, found: dict[str, np.ndarray], rest: dict[str, np.ndarray]
+) -> dict[str, np.ndarray]:
     """Lanes of two parts in their order."""
-    out = np.empty((len(there), *found.shape[1:]), found.dtype)
-    out[there], out[~there] = found, rest
-    return out
+    merged = {name: np.empty((len(there), *each.shape[1:]), each.dtype)
+              for name, each in found.items()}  # fmt: skip
+    for name, out in merged.items():
+        out[there], out[~there] = found[name], rest[name]
+    return merged
