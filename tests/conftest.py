@@ -13,6 +13,9 @@ import pytest
 from hypothesis import settings
 from numba.core.dispatcher import Dispatcher
 
+# until all tests are collected: syntax trees are many objects, and next to none is garbage
+gc.disable()
+
 # a test that is right stays right on a busy machine, and says the same each time
 settings.register_profile("equimorph", deadline=None, derandomize=True)
 settings.load_profile("equimorph")
@@ -24,9 +27,12 @@ sys.dont_write_bytecode = False
 # whichever way pytest is started, `typecheck` and `oracles` are found beside this file
 sys.path.insert(0, str(Path(__file__).parent))
 if os.environ.get("EQUIMORPH_SHAPES", "checked") != "unchecked":
-    from typecheck import install
+    from typecheck import compile_share, install
 
     install()
+    if worker := os.environ.get("PYTEST_XDIST_WORKER"):
+        number, count = int(worker.removeprefix("gw")), int(os.environ["PYTEST_XDIST_WORKER_COUNT"])
+        compile_share(Path(__file__).parents[1] / "src" / "equimorph", number, count)
 
 TENTHS = 10
 END_TO_END = (
@@ -67,6 +73,7 @@ def pytest_collection_finish() -> None:
     """What lives as long as the tests need not be looked through again and again for garbage."""
     if style := sys.modules.get("equimorph.plotting.style"):
         style.RESOLUTION = COARSE
+    gc.enable()
     gc.collect()
     gc.freeze()
 

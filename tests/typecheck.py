@@ -16,6 +16,7 @@ from importlib.abc import MetaPathFinder
 from importlib.machinery import ModuleSpec, PathFinder
 from inspect import isclass
 from itertools import islice
+from pathlib import Path
 from threading import local
 from types import FunctionType, MappingProxyType, ModuleType
 from typing import Any
@@ -38,6 +39,28 @@ def install() -> None:
     jaxtyping.jaxtyped = checked  # the name that the hook puts above each function
     install_import_hook("equimorph", "typecheck.check")
     sys.meta_path.insert(0, PlainCompiledModules())
+
+
+def compile_share(source: Path, number: int, count: int) -> None:
+    """Keep the byte code with checks of every `count`-th module, from one on, executing none.
+
+    Processes that start together would each compile all: they read what the others keep.
+    """
+    for file in sorted(source.rglob("*.py"))[number::count]:
+        parts = file.relative_to(source.parent).with_suffix("").parts
+        package = file.name == "__init__.py"
+        name = ".".join(parts[:-1] if package else parts)
+        where = [str(file.parents[1] if package else file.parent)]
+        finders = (each.find_spec(name, where, None) for each in sys.meta_path)
+        loader: Any = next(spec for spec in finders if spec is not None).loader
+        with_checks = loader.get_code
+
+        def keep(name: str, get_code: Callable[[str], Any] = with_checks) -> Any:
+            get_code(name)
+            return compile("", name, "exec")
+
+        loader.get_code = keep
+        loader.exec_module(ModuleType(name))
 
 
 @contextmanager
