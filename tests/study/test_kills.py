@@ -97,15 +97,15 @@ def arch(runner: Runner, tmp_path_factory: pytest.TempPathFactory) -> Trial:
     return _trial(runner, tmp_path_factory.mktemp("arch"), ARCH, dots=False)
 
 
-def _kill(trial: Trial, count: int, folder: Path, seed: int) -> Counter[str]:
-    """Kill runs at random times, up to three times in each folder, so that all stages are met."""
+def _kill(trial: Trial, count: int, folder: Path, seed: int, until: float = 0.8) -> Counter[str]:
+    """Kill runs before a share `until` of their time; up to three times in each folder."""
     generator = random.Random(seed)
     stages: Counter[str] = Counter()
     series = 0
     while stages.total() < count:
         assert series < 10 * count
         left = min(3, count - stages.total())
-        moments = [generator.uniform(0.0, 0.8 * trial.seconds) for _ in range(left)]
+        moments = [generator.uniform(0.0, until * trial.seconds) for _ in range(left)]
         out = folder / f"out-{series}"
         stages.update(trial.survives(out, [{"after": moment} for moment in moments]))
         series += 1
@@ -129,7 +129,8 @@ def test_kills_at_random_times_change_nothing(
     for more in range(10):  # on a busy machine a run may be slower than the one that was timed
         if "figures" in stages:
             break
-        stages += _kill(spring, 1, tmp_path / f"more-{more}", seed=100 + 10 * seed + more)
+        folder, until = tmp_path / f"more-{more}", 0.8 + 0.2 * more
+        stages += _kill(spring, 1, folder, seed=100 + 10 * seed + more, until=until)
     record_property("stages", dict(stages))
     assert stages.total() >= 100 // PARTS
     assert "figures" in stages
