@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 
 import equimorph as em
+from equimorph.manifold.complex.description import beyond_bounds
 from equimorph.manifold.geometry.points import VertexKind
 from oracles import specimens
 from oracles.complexes import assert_faithful
+from oracles.specimens import toggle
 from typecheck import unchecked
 
 
@@ -180,3 +182,33 @@ def test_a_member_that_is_pressed_ends_where_it_has_no_length(space):
     within = [frame.max_curvature <= 1.0]
     eset = em.equilibrium_set(frame, em.Box(P=(0.0, 6.0)), within=within, intervals=(4,), checks=0)
     assert eset.coordinates.max() == pytest.approx(4.95, rel=1e-9)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("a", "load", "bound", "intervals"),
+    [
+        ((-0.8381, 0.6701), (-1.8168, 1.6665), 11.97, (7, 6)),
+        ((-0.6045, 0.6457), (-0.9097, -0.1394), 13.08, (6, 4)),
+    ],
+)
+def test_members_with_several_bends_end_where_the_sharpest_has_the_bound(a, load, bound, intervals):
+    """Peaks of like heights in one element: vertices were up to .17 beyond the bound, or below."""
+    frame = toggle(2, 10)
+    box, within = em.Box(a=a, P=load), [frame.max_curvature <= bound]
+    eset = em.equilibrium_set(frame, box, within=within, intervals=intervals)
+    at_bound = eset.points[eset.kinds == VertexKind.CAP]
+    assert eset.audit.clean
+    assert frame.max_curvature(eset.points).max() <= bound * (1.0 + 1e-9)
+    np.testing.assert_allclose(frame.max_curvature(at_bound), bound, rtol=1e-9)
+
+
+def test_cells_with_a_vertex_beyond_a_bound_are_wrong():
+    """Of a set that does not know the bound; sets that know it have none."""
+    spring, box = em.Spring(), em.Box(x_l=(0.6, 1.4), F=(-0.4, 0.4))
+    free, bound = em.equilibrium_set(spring, box, intervals=(6, 6)), spring.angle <= 0.2
+    held = em.equilibrium_set(spring, box, within=[bound], intervals=(6, 6))
+    beyond = (spring.angle(free.points) > 0.2)[free.cells].any(axis=1)
+    assert 0 < beyond.sum() < len(beyond)
+    np.testing.assert_array_equal(beyond_bounds(free.points, free.cells, (bound,)), beyond)
+    assert not beyond_bounds(held.points, held.cells, (bound,)).any()

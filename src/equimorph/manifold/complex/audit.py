@@ -28,8 +28,9 @@ class Audit:
     Facets at which two sheets cross (`crossings`: four cells each, whose orientations cancel) are
     not counted among the non-manifold ones.
     `overturned` cells project against the orientation that their index demands: slivers at folds.
-    `wrong` cells, which must be none, do so away from folds and are no slivers, or have a vertex
-    whose negative eigenvalues, counted anew at every vertex, are not those of their index.
+    `wrong` cells, which must be none, do so away from folds and are no slivers, have a vertex whose
+    negative eigenvalues, counted anew at every vertex, are not those of their index, or one beyond
+    a constraint, as where a descriptor jumps.
     Of the equilibria found by random search at random points, `recovered` were missing and have
     been added; in the last round, `missing` of `checked` were, which must be zero too.
 

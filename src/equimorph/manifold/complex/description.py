@@ -31,7 +31,7 @@ from equimorph.manifold.geometry.topology import (
     pieces,
     senses,
 )
-from equimorph.model import Box
+from equimorph.model import Box, Constraint, worst_relative_excess
 from equimorph.structures import States
 
 SHEETS_AT_A_CROSSING = 4
@@ -228,6 +228,7 @@ def _audit(
     wrong |= overturned_off_folds(
         given.kinds, corners, sense.overturned, coordinates / setting.scales
     )
+    wrong |= beyond_bounds(points, corners, setting.constraints)
     whole_crossing = whole.counts == SHEETS_AT_A_CROSSING
     most = np.where(crossed, SHEETS_AT_A_CROSSING, 2)
     kinds = [boundary.kind for boundary in boundaries]
@@ -264,11 +265,13 @@ def wrong_cells(eset: EquilibriumSet) -> CellFlags:
     sense = senses(eset.cells, eset.cell_index, coordinates, adjacency(eset.cells), eset.component)
     off = overturned_off_folds(eset.kinds, eset.cells, sense.overturned, coordinates / scales)
     of_index = contradictions(eset.points, eset.kinds, eset.cells, eset.cell_index)
-    return np.asarray(of_index | off)
+    return np.asarray(of_index | off | beyond_bounds(eset.points, eset.cells, eset.constraints))
 
 
 SLIVER = 0.03
 """Height of a cell over its longest edge, below which it may be overturned next to folds."""
+BEYOND = 1e-5
+"""Excess of a vertex over a bound, relative to that, which is not that of its location."""
 VANISHING = 1e-4
 """Size of the eigenvalues that may count either way at folds and where sheets cross."""
 
@@ -290,6 +293,12 @@ def contradictions(
         bound[singular] = solved.negative - structure.constraints
     index = cell_index[:, None]
     return np.asarray(((index < low[cells]) | (index > high[cells])).any(axis=1))
+
+
+def beyond_bounds(points: States, cells: Cells, constraints: tuple[Constraint, ...]) -> CellFlags:
+    """Cells with a vertex that violates a constraint, as where its descriptor jumps."""
+    beyond = worst_relative_excess(constraints, points.z, points.p) > BEYOND
+    return np.asarray(beyond[cells].any(axis=1))
 
 
 def overturned_off_folds(

@@ -117,8 +117,8 @@ class ClampedFields:
 
 Angles = Float[np.ndarray, "lanes nodes"]
 
-NEAR = 0.97
-"""Share of the largest nodal curvature from which on an element may hold the largest one."""
+NEAR = 0.84
+"""Share of the largest nodal curvature from which on a peak may be the largest one."""
 REFINING = 4
 """Newton steps from the largest nodal curvature to the extremum of its polynomial."""
 
@@ -209,13 +209,14 @@ class GeneralFields:
     def largest_curvature(self, angles: Angles, scalars: Scalars) -> tuple[Values, Values]:
         """max_s |κ(s)|, ends and interior extrema included, and the arclength where it occurs.
 
-        The largest nodal values, improved by Newton on the interpolants of their elements.
+        The highest peaks of the nodal values, improved by Newton on the interpolants of their elements.
         """
         kappa = self.everywhere(angles, scalars)[:, :, KAPPA]
         sizes = np.abs(kappa)
-        nodal = sizes.max(axis=2)
-        lane, element = np.nonzero(~(nodal < NEAR * nodal.max(axis=1, keepdims=True)))
-        top = sizes[lane, element].argmax(axis=1)
+        sides = np.pad(sizes, ((0, 0), (0, 0), (1, 1)), constant_values=-np.inf)
+        lower = (sizes < sides[:, :, :-2]) | (sizes <= sides[:, :, 2:])
+        low = sizes < NEAR * sizes.max(axis=(1, 2), keepdims=True)
+        lane, element, top = np.nonzero(~(lower | low))
         x, value = self._extrema(kappa[lane, element], top)
         order = np.lexsort((value, lane))
         last = order[np.searchsorted(lane[order], np.arange(len(kappa)), side="right") - 1]

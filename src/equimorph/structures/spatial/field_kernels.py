@@ -9,6 +9,7 @@ from equimorph.linalg.compiled import njit
 from equimorph.linalg.kernels import FLAGS, INNER, write_lanes
 from equimorph.linalg.simd import (
     LANES,
+    lanes_less,
     larger,
     load,
     smaller,
@@ -39,6 +40,9 @@ from equimorph.structures.spatial.jet_kernels import (
 
 POLISHING = np.int64(4)
 """Newton iterations towards the largest curvature of an element."""
+LOWEST = 0.8
+"""Least share of the largest κ² of all stations that one next to the extremum has: with five
+stations a degree cos(π/5), by the inequality in `AnyFrame.largest_norms`."""
 ONE = np.int64(1)
 """Parts of the jets: values only."""
 
@@ -106,13 +110,13 @@ def _find_places(elements, order, sums, steps, begins, origin, scalars, y, place
 
 
 @njit(**INNER)
-def _largest(elements, order, table, to_legendre, strains, square, where, chosen, series):
+def _largest(elements, order, table, to_legendre, strains, sizes, square, where, chosen, series):
     """Largest κ_n² + κ_b² of all elements into square; element and share of it into `where`.
 
-    table: values at stations, after the stations themselves; then Newton's method on the series.
+    table: values at stations, after the stations themselves; every station that is a peak among
+    these, in a lane, and not much lower than the highest one starts Newton's method on the series.
     """
-    zero, one, two = spread(0.0), spread(1.0), spread(2.0)
-    stations = table.shape[0]
+    zero, stations = spread(0.0), table.shape[0]
     most, element, share = spread(-1.0), zero, zero
     for e in range(elements):
         for s in range(stations):
@@ -122,23 +126,53 @@ def _largest(elements, order, table, to_legendre, strains, square, where, chosen
                 a, b = a + by * load(strains, at + 1), b + by * load(strains, at + 2)
             value = a * a + b * b
             value = where_less(value, spread(1e300), value, spread(-1.0))
+            store(sizes, e * stations + s, value)
             element = where_less(most, value, spread(e), element)
             share = where_less(most, value, spread(table[s, 0]), share)
             most = where_less(most, value, value, most)
+    store(square, 0, most)
     store(where, 0, element)
-    for lane in range(LANES):
-        e = np.int64(where[0, lane])
-        for i in range(order):
-            for k in range(2):
-                chosen[2 * i + k, lane] = strains[3 * (e * order + i) + 1 + k, lane]
+    store(where, 1, share)
+    lowest = spread(LOWEST) * most
+    for e in range(elements):
+        ready = False
+        for s in range(stations):
+            value = load(sizes, e * stations + s)
+            peak = where_less(lowest, value, spread(1.0), zero)
+            if s > 0:
+                peak = where_less(value, load(sizes, e * stations + s - 1), zero, peak)
+            if s < stations - 1:
+                peak = where_less(load(sizes, e * stations + s + 1), value, peak, zero)
+            if lanes_less(zero, peak) == 0:
+                continue
+            if not ready:
+                _series(e, order, to_legendre, strains, chosen, series)
+                ready = True
+            _polish(e, order, table[s, 0], stations, peak, series, square, where)
+    most = load(square, 0)
+    store(square, 0, where_less(most, zero, spread(np.nan), square_root(larger(most, zero))))
+
+
+@njit(**INNER)
+def _series(e, order, to_legendre, strains, chosen, series):
+    """Legendre coefficients of κ_n and κ_b in an element."""
+    for i in range(order):
+        for k in range(2):
+            store(chosen, 2 * i + k, load(strains, 3 * (e * order + i) + 1 + k))
     for c in range(order):
         for k in range(2):
-            value = zero
+            value = spread(0.0)
             for i in range(order):
                 value = value + spread(to_legendre[c, i]) * load(chosen, 2 * i + k)
             store(series, 2 * c + k, value)
-    width = spread(np.pi / stations)
-    t, place = share, share
+
+
+@njit(**INNER)
+def _polish(e, order, station, stations, peak, series, square, where):
+    """Newton's method from a station, in lanes in which it is a peak; larger values replace best."""
+    zero, one, two = spread(0.0), spread(1.0), spread(2.0)
+    most, element, place = load(square, 0), load(where, 0), load(where, 1)
+    width, t = spread(np.pi / stations), spread(station)
     for step in range(POLISHING + 1):
         x = two * t - one
         before, now, d_before, d_now, dd_before, dd_now = one, x, zero, one, zero, zero
@@ -154,15 +188,17 @@ def _largest(elements, order, table, to_legendre, strains, square, where, chosen
             u, v = load(series, 2 * c), load(series, 2 * c + 1)
             a, b, da, db = a + u * now, b + v * now, da + u * d_now, db + v * d_now
             dda, ddb = dda + u * dd_now, ddb + v * dd_now
-        value = a * a + b * b
+        value = where_less(zero, peak, a * a + b * b, zero)
         if step > 0:
+            element = where_less(most, value, spread(e), element)
             place = where_less(most, value, t, place)
             most = where_less(most, value, value, most)
         slope, bend = a * da + b * db, a * dda + b * ddb + da * da + db * db
         move = where_less(bend, zero, zero - slope / (two * bend), zero)
         move = smaller(larger(move, zero - width), width)
         t = smaller(larger(t + move, zero), one)
-    store(square, 0, where_less(most, zero, spread(np.nan), square_root(larger(most, zero))))
+    store(square, 0, most)
+    store(where, 0, element)
     store(where, 1, place)
 
 
@@ -191,6 +227,7 @@ def fields_lanes(
     bends, sites, axes = work_rows(3 * many), work_rows(3 * many), work_rows(9)
     best, where = work_rows(1), work_rows(2)
     chosen, series = work_rows(2 * order), work_rows(2 * order)
+    sizes = work_rows(elements * table.shape[0])
     no_z, no_p = np.empty((z.shape[0], 0, z.shape[1])), np.empty((z.shape[0], 0, p.shape[1]))
     for block in range(0, z.shape[0], LANES):
         start = min(block, z.shape[0] - LANES)
@@ -259,7 +296,7 @@ def fields_lanes(
                 tied, y, bends,
             )  # fmt: skip
         _find_places(elements, order, sums, steps, begins, origin, scalars, y, sites)
-        _largest(elements, order, table, to_legendre, bends, best, where, chosen, series)
+        _largest(elements, order, table, to_legendre, bends, sizes, best, where, chosen, series)
         write_lanes(unit, 0, 1, rotations, start * 4 * nodes, 4 * nodes, 4 * nodes)
         write_lanes(sites, 0, 1, places, start * 3 * many, 3 * many, 3 * many)
         write_lanes(bends, 0, 1, strains, start * 3 * many, 3 * many, 3 * many)
