@@ -169,7 +169,7 @@ def _series(e, order, to_legendre, strains, chosen, series):
 
 @njit(**INNER)
 def _polish(e, order, station, stations, peak, series, square, where):
-    """Newton's method from a station, in lanes in which it is a peak; larger values replace best."""
+    """Newton's method from a station in lanes in which it is a peak; larger values replace best."""
     zero, one, two = spread(0.0), spread(1.0), spread(2.0)
     most, element, place = load(square, 0), load(where, 0), load(where, 1)
     width, t = spread(np.pi / stations), spread(station)
