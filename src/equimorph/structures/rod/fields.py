@@ -209,7 +209,7 @@ class GeneralFields:
     def largest_curvature(self, angles: Angles, scalars: Scalars) -> tuple[Values, Values]:
         """max_s |κ(s)|, ends and interior extrema included, and the arclength where it occurs.
 
-        The highest peaks of the nodal values, improved by Newton on the interpolants of their elements.
+        The highest peaks of the nodal values, improved by Newton on the elements' interpolants.
         """
         kappa = self.everywhere(angles, scalars)[:, :, KAPPA]
         sizes = np.abs(kappa)
