@@ -249,7 +249,7 @@ class AnyFrame(StressedFrame, Shortening):
         largest = sizes.max(axis=2)
         polished = np.linalg.norm(np.einsum("ni,nik->nk", basis, own), axis=1)
         np.maximum.at(largest, (lane, element), polished)
-        return largest
+        return np.asarray(largest)
 
     # --- pictures -------------------------------------------------------------------------------
 
