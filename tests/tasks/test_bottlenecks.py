@@ -146,16 +146,21 @@ def _torque(strip):
     return em.largest_of("torque", *couples)
 
 
-@pytest.mark.slow
-def test_the_bars_of_a_truss_need_not_be_shorter_than_straight():
-    """Its two folds meet in a cusp where the bars are straight: a = 1 − √1.09."""
-    truss = em.Truss(
+def truss_that_gives() -> em.Truss:
+    """Two bars that change their lengths together; its folds meet in a cusp at a = 1 − √1.09."""
+    return em.Truss(
         {"A": (-1.0, 0.0), "B": (0.0, 0.3), "C": (1.0, 0.0)},
         [em.Bar(ends, EA=1.0) for ends in (("A", "B"), ("B", "C"))],
         {"A": "xy", "C": "xy"},
         {"F": {"B": (0.0, -1.0)}},
         {"a": {"A-B": 1.0, "B-C": 1.0}},
     )
+
+
+@pytest.mark.slow
+def test_the_bars_of_a_truss_need_not_be_shorter_than_straight():
+    """Its two folds meet in a cusp where the bars are straight: a = 1 − √1.09."""
+    truss = truss_that_gives()
     box, height = em.Box(a=(-0.1, 0.03), F=(-0.02, 0.02)), truss.displacement("B", "y")
     objective = em.least(em.value_of(truss, "a"))
     with unchecked():
@@ -242,3 +247,20 @@ def test_refusals_say_how_far_each_demand_has_to_give_way(spring_set, sides):
     assert route.explanation.startswith(route.why)
     assert route.nearest is not None
     assert route.nearest["x_l"] <= 1.2
+
+
+@pytest.mark.parametrize(("a", "load"), [(0.0, 0.001), (-0.01, -0.002)])
+def test_a_bound_just_above_a_fold_leaves_a_way(a, load):
+    """Sheets meet at the cusp, |a| = √1.09 − 1: bounds .2 and .05 % above are obeyed; not below."""
+    truss, height = truss_that_gives(), np.sqrt(1.09) - 1.0
+    rise, change = truss.displacement("B", "y"), abs(em.value_of(truss, "a"))
+    with unchecked():
+        box = em.Box(a=(-0.1, 0.03), F=(-0.02, 0.02))
+        eset = em.equilibrium_set(truss, box, intervals=(20, 20))
+        rest = eset.at(a=a, F=load).stable
+        ends = max(rest, key=rise), min(rest, key=rise)
+        for share in (1.002, 1.0005):
+            route = em.plan(eset, *ends, within=[change <= share * height])
+            assert route.arrived
+            assert height <= change(route.states).max() <= share * height
+        assert not em.plan(eset, *ends, within=[change <= 0.998 * height]).arrived

@@ -6,13 +6,20 @@ from dataclasses import replace
 import numpy as np
 
 from equimorph.arrays import Lanes, Parameters, Values
+from equimorph.equilibria.soft_modes import metric_length
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Constraint, Descriptor, eased
 from equimorph.structures import States, join_states, stability_margin
 from equimorph.tasks.optimising.programme import Objective
 from equimorph.tasks.planning.bottlenecks import Passing, find_bottleneck
 from equimorph.tasks.planning.filtration import Filtration
-from equimorph.tasks.planning.network import Demands, Ends, cheapest_path, explain_no_route
+from equimorph.tasks.planning.network import (
+    Demands,
+    Ends,
+    cheapest_path,
+    connect,
+    explain_no_route,
+)
 from equimorph.tasks.planning.objectives import ROUGH, Extreme
 from equimorph.tasks.planning.straightening import (
     follow_direction,
@@ -23,6 +30,8 @@ from equimorph.tasks.planning.straightening import (
 from equimorph.tasks.route import Route, describe_place, refusal
 from equimorph.tasks.stable_part import cell_near
 
+SHORTEST = 2
+"""Steps of a way over a pass, at least."""
 KEPT = (0.9, 0.5)
 """Shares of the largest possible margin that a route with a low peak tries to keep."""
 
@@ -91,7 +100,7 @@ def _path(
 ) -> States | None:
     """Cheapest path between the ordered ends over the network, and a pass; else the lowest way."""
     first, last = order_ends(ends)
-    over = None if passing is None else passing.over
+    over = None if passing is None else _linked_over(passing, demands)
     for way in () if over is None else (over, over[::-1]):
         parts = (cheapest_path(eset, (first, way[0]), demands), way[1:-1],
                  cheapest_path(eset, (way[-1], last), demands))  # fmt: skip
@@ -101,6 +110,24 @@ def _path(
     if path is not None or passing is None:
         return path
     return passing.way if order_ends(ends) is ends else passing.way[::-1]
+
+
+def _linked_over(passing: Passing, demands: Demands) -> States | None:
+    """Of the states over a pass those around it that straight lifts join.
+
+    Farther off, where the network is wide, they may lie close along a bound that bends.
+    """
+    over = passing.over
+    if over is None or len(over) <= SHORTEST:
+        return over
+    linked, _ = connect(over[:-1], over[1:], demands)
+    gap = metric_length(
+        over.structure, (over.z - passing.bottleneck.state.z)[:, : over.structure.unknowns]
+    )
+    middle, broken = int(gap.argmin()), np.flatnonzero(~linked)
+    start = int(broken[broken < middle].max(initial=-1)) + 1
+    end = int(broken[broken >= middle].min(initial=len(linked)))
+    return over if end - start < SHORTEST else over[start : end + 1]
 
 
 def with_extreme(route: Route, extreme: Extreme | None) -> Route:

@@ -16,7 +16,7 @@ from equimorph.structures import State
 from equimorph.tasks.planning.free_routes import free_route, route_with_lowest_peak, with_extreme
 from equimorph.tasks.planning.network import Demands
 from equimorph.tasks.planning.objectives import Extreme, Wish
-from equimorph.tasks.planning.refusals import explained_refusal
+from equimorph.tasks.planning.refusals import free_or_over_a_pass
 from equimorph.tasks.planning.snap_routes import route_with_snaps
 from equimorph.tasks.planning.straightening import check_ends, verify_way_points, violation
 from equimorph.tasks.planning.surviving_routes import judged, surviving_route
@@ -114,7 +114,7 @@ def plan(  # noqa: PLR0913  # the knobs of the public face, most by keyword
             return route_with_lowest_peak(eset, ends, extreme, demands, monitor)
         free = free_route(eset, ends, demands, monitor)
         if snap_price is None:
-            return free or explained_refusal(eset, ends, demands, monitor)
+            return free_or_over_a_pass(eset, ends, demands, monitor, free)
         snapping = route_with_snaps(eset, ends, demands, snap_price, monitor)
         arrived = [route for route in (free, snapping) if route is not None and route.arrived]
         return min(arrived, key=lambda route: route.cost, default=snapping)
