@@ -13,7 +13,7 @@ from equimorph.study.problem import parse_study
 from typecheck import unchecked
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
-NAMES = ("arch", "strip", "arm", "beam", "deep_arch", "stack", "truss", "column")
+NAMES = ("arch", "strip", "arm", "beam", "deep_arch", "stack", "truss", "column", "least_torque")
 
 
 def study(name):

@@ -1,6 +1,7 @@
 """Figures fit at any size and with long names: nothing leaves them, tick labels stay apart."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -128,3 +129,17 @@ def test_margins_show_limits_with_what_is_limited(route):
     lowest = ax.figure.axes[-1]
     assert [1.4, 1.4] in [list(line.get_ydata()) for line in lowest.lines]
     assert 1.4 < lowest.get_ylim()[1] < 9.0
+
+
+def test_labels_of_margins_are_no_longer_than_their_panels(route):
+    """They are broken into lines, also inside words, but not inside units."""
+    angle = route.path.states.structure.angle
+    names = ("the larger one of the couples of both motors at the ends of the strip", "m" * 60)
+    long = [replace(angle, name=name, symbol=name) for name in names]
+    values = {each.name: each(route.states) for each in long}
+    schedule = replace(route.schedule, descriptors=values)
+    ax = plotting.margins(replace(route, schedule=schedule), within=[each <= 1.4 for each in long])
+    ax.figure.draw_without_rendering()
+    boxes = [each.yaxis.label.get_window_extent() for each in ax.figure.axes]
+    assert len(boxes) == 3
+    assert all(below.y1 <= above.y0 for above, below in pairwise(boxes))

@@ -1,7 +1,9 @@
 """A route over its length: margin and limited quantities; strips of every parameter that moves."""
 
+import re
 from collections.abc import Sequence
 from itertools import groupby
+from textwrap import fill
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -24,6 +26,7 @@ _GAP = 0.1
 """Inches between panels."""
 _ROOM = (0.58, 0.38, 0.1, 0.2)
 """Inches around the panels: left, bottom, right, top."""
+_UNIT = re.compile(r"\([^()]*\)$")
 _MOST_NUMBERS = 12
 """Largest number of way points that are numbered one by one."""
 
@@ -63,6 +66,7 @@ def margins(route: Route, ax: Axes | None = None, *, within: Sequence[Constraint
         snaps = snap_steps(route)
         _draw(ax, schedule, schedule.margins, _MARGIN_COLOUR, snaps)
         ax.set_ylabel("stability margin")
+        panels = [ax]
         ax.set_ylim(0.0, 1.15 * schedule.margins.max())
         if not len(snaps):  # else it is zero at the snap, as the dotted line says
             _mark(ax, schedule, int(np.argmin(schedule.margins)), schedule.margins)
@@ -76,9 +80,25 @@ def margins(route: Route, ax: Axes | None = None, *, within: Sequence[Constraint
             lowest.set_ylabel(descriptor_label(descriptor))
             _draw_limits(lowest, values, limits)
             _mark(lowest, schedule, int(np.argmax(np.abs(values))), values)
+            panels.append(lowest)
+        _wrap(panels)
         lowest.set_xlabel("share of the length of the route")
         _number_way_points(ax, schedule, corner_steps(route))
     return ax
+
+
+def _wrap(panels: Sequence[Axes]) -> None:
+    """Break labels that are longer than their panels into lines of no greater length."""
+    figure = panels[0].get_figure(root=True)
+    assert figure is not None
+    figure.draw_without_rendering()
+    for panel in panels:
+        label, room = panel.yaxis.label, panel.get_window_extent().height
+        length, text = label.get_window_extent().height, label.get_text()
+        if length > room:
+            width = max(int(0.95 * len(text) * room / length), 1)
+            whole = _UNIT.sub(lambda unit: unit[0].replace(" ", "\N{NO-BREAK SPACE}"), text)
+            label.set_text(fill(whole, width))
 
 
 def _bounds(

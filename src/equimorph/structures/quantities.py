@@ -5,6 +5,7 @@ Compared with a number, each is a `Constraint` for any task: ``effort_of(arch, "
 
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -224,7 +225,8 @@ def _absolute(structure: Structure, inner: str) -> Descriptor:
 
 def _largest(structure: Structure, inner: str) -> Descriptor:
     parts = [find_descriptor(structure, part) for part in _COMMA.split(inner)]
-    return largest_of(f"largest({', '.join(each.name for each in parts)})", *parts)
+    largest = largest_of(f"largest({', '.join(each.name for each in parts)})", *parts)
+    return replace(largest, symbol=f"max({', '.join(each.symbol or each.name for each in parts)})")
 
 
 def _distance(structure: Structure, inner: str) -> Descriptor:
