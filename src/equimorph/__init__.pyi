@@ -176,6 +176,9 @@ from .manifold import (
 from .explorer import (
     explore as explore,
 )
+from .progress import (
+    ProgressBars as ProgressBars,
+)
 
 # Choose coordinates and preferred states
 from .charts import (

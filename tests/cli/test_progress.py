@@ -1,16 +1,16 @@
 import pytest
 
-from equimorph.cli.output import ScreenProgress
+from equimorph.progress import ProgressBars
 
 
 def test_nothing_is_drawn_before_the_first_report(capsys: pytest.CaptureFixture[str]):
-    with ScreenProgress():
+    with ProgressBars():
         pass
     assert capsys.readouterr().err == ""
 
 
 def test_a_stage_that_begins_ends_the_one_before(capsys: pytest.CaptureFixture[str]):
-    with ScreenProgress() as progress:
+    with ProgressBars() as progress:
         progress.report("seeds", 0, 1)
         progress.report("edges", 40, None)
         progress.report("figures", 1, 2)
@@ -21,7 +21,7 @@ def test_a_stage_that_begins_ends_the_one_before(capsys: pytest.CaptureFixture[s
 
 def test_a_stage_that_goes_on_never_passes_its_total(capsys: pytest.CaptureFixture[str]):
     """Edges are lifted again after loops were closed, and then there are more of them."""
-    with ScreenProgress() as progress:
+    with ProgressBars() as progress:
         progress.report("edges", 40, None)
         progress.report("loops", 0, 1)
         progress.report("edges", 60, None)

@@ -5,9 +5,9 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from equimorph.cli.output import ScreenProgress
 from equimorph.paper import reproduce
 from equimorph.paper.reproduction import in_words
+from equimorph.progress import ProgressBars
 
 
 def reproduce_and_show(out: Path) -> None:
@@ -19,7 +19,7 @@ def reproduce_and_show(out: Path) -> None:
         Folder for figures and the report.
     """
     screen = Console(highlight=False)
-    with ScreenProgress() as progress:
+    with ProgressBars() as progress:
         found = reproduce(out, progress=progress)
     rows = [row for example in found.numbers for row in found.rows(example)]
     table = Table(box=None, header_style="bold")
