@@ -69,13 +69,15 @@ def test_slices_find_the_narrow_way_of_two_wells_side_by_side(pair):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("low", [-0.02, 0.02])
-def test_slices_through_reached_states_find_what_two_actuators_cannot_do(low):
-    """a = a₁ + a₂ + a₃ falls below zero only if all three are near their lower ends."""
-    wells = structure("u**4/4 - (a + b + c)*u**2/2 - F*u", ("u",), ("a", "b", "c", "F"))
-    ends = [state(wells, [side], [0.4, 0.4, 0.4, 0.0]) for side in (1, -1)]
-    box = em.Box(a=(low, 0.4), b=(low, 0.4), c=(low, 0.4), F=(-0.2, 0.2))
+@pytest.mark.parametrize("parts", [3, 4, 5])
+def test_slices_through_reached_states_find_what_two_actuators_cannot_do(parts, low):
+    """a = a₁ + a₂ + … falls below zero only if all of four to six actuators but F are near lower ends."""
+    names = [f"a{i}" for i in range(parts)]
+    wells = structure(f"u**4/4 - ({' + '.join(names)})*u**2/2 - F*u", ("u",), (*names, "F"))
+    ends = [state(wells, [side], [0.4] * parts + [0.0]) for side in (1, -1)]
+    box = em.Box(**dict.fromkeys(names, (low, 0.4)), F=(-0.2, 0.2))
     with unchecked():
-        route = em.plan_sampled(*ends, box, options=em.SamplingOptions(lifts=1, slices=24))
+        route = em.plan_sampled(*ends, box, options=em.SamplingOptions(lifts=1, slices=8 * parts))
     assert route.arrived == (low < 0.0)
 
 
