@@ -47,11 +47,7 @@ A = [0.1, 0, 0]
 [set]
 box = { P = [0.0, 3.0] }
 intervals = [4]
-checks = 0
 """
-"""No independent search: Newton's method from random guesses leads to states in which one node's
-quaternion is the negative of its neighbours', which no mesh resolves and which count as left out.
-The set is followed from the natural state through its folds."""
 
 
 def example(name: str, *coarser: tuple[str, str]) -> str:

@@ -71,7 +71,7 @@ def test_slices_find_the_narrow_way_of_two_wells_side_by_side(pair):
 @pytest.mark.parametrize("low", [-0.02, 0.02])
 @pytest.mark.parametrize("parts", [3, 4, 5])
 def test_slices_through_reached_states_find_what_two_actuators_cannot_do(parts, low):
-    """a = a₁ + a₂ + … falls below zero only if all of four to six actuators but F are near lower ends."""
+    """a = a₁ + a₂ + … falls below 0 only if all but F of 4, 5, 6 actuators are near their ends."""
     names = [f"a{i}" for i in range(parts)]
     wells = structure(f"u**4/4 - ({' + '.join(names)})*u**2/2 - F*u", ("u",), (*names, "F"))
     ends = [state(wells, [side], [0.4] * parts + [0.0]) for side in (1, -1)]

@@ -2,6 +2,7 @@
 
 import pytest
 
+import equimorph as em
 from equimorph.errors import InputError
 from equimorph.structures import Frame, Member
 from typecheck import unchecked
@@ -78,6 +79,7 @@ def made(joints=JOINTS, members=MEMBERS, supports=HELD, loads=LOADS, actuators=N
         ({"loads": {"P": {"D": (0, 1)}}}, "`joint` must be one of A, B, C; got 'D'"),
         ({"loads": {"P": {"A-C": (0, 1)}}}, "`member` must be one of A-B, B-C; got 'A-C'"),
         ({"loads": {"P": {"A": (0, 1)}}}, "`loads.P` must act on a member, or on a joint"),
+        ({"loads": {"p": {"A-B": em.Pressure()}}}, "(no `Pressure`, which acts on a `Rod` only)"),
         ({"loads": {"P": {}}}, "`loads.P` must act on a member, or on a joint"),
         ({"loads": {"P": {"B": (0,)}}}, "`loads.P.B` must be 2 or 3 finite numbers; got (0,)"),
         ({"loads": {"P": {"weight": (0, -1)}}}, "`loads.P.weight` must act on members with a wei"),

@@ -99,8 +99,9 @@ class AnyFrameNetwork(Network):
 
 Loads = Annotated[
     Mapping[str, Mapping[str, Sequence[float]]],
-    "forces or line loads of finite numbers by joint or member, by the name of the load, like "
-    "`{'F': {'B': (0, -1)}}`, or in space `{'F': {'B': (0, 0, -1)}}`",
+    "forces or line loads of finite numbers by joint or member (no `Pressure`, which acts on a "
+    "`Rod` only), by the name of the load, like `{'F': {'B': (0, -1)}}`, or in space "
+    "`{'F': {'B': (0, 0, -1)}}`",
 ]
 KINDS = ("curvature", "length", "move", "turn")
 Effects = Mapping[Annotated[str, one_of(*KINDS)], Mapping[str, float | Sequence[float]]]
