@@ -321,6 +321,10 @@ def test_a_name_that_is_no_argument_is_refused_with_those_that_are(things):
         (lambda: em.Member(("A", "B"), curvatur=1.0), r"got curvatur. Did you mean curvature\?$"),
         (em.limit_load, r"`limit_load` must have the argument state; got n"),
         (lambda: em.Spring(1.0, 2.0, 3.0, 4.0), r"among .*; got 4 without names\.$"),
+        (
+            lambda: em.Spring(1.0, stiffness=2.0),
+            r"^`Spring` must have each argument once; got \w+ by place and by name\.$",
+        ),
     ],
 )
 def test_calls_with_too_few_or_too_many_values_are_refused(call, said):

@@ -130,7 +130,8 @@ class Entry:
         missing = [name for name in self._needed if name not in self._names[:first]]
         missing = [name for name in missing if name not in kwargs] if missing else missing
         surplus = first > len(self._names) and not self._rest_name
-        if not (unknown or missing or surplus):
+        twice = [name for name in self._names[:first] if name in kwargs] if kwargs else []
+        if not (unknown or missing or surplus or twice):
             return
         made = self._function.__name__ == "__init__"
         name = type(args[0]).__name__ if made and args else self._function.__name__
@@ -141,6 +142,10 @@ class Entry:
             raise InputError(f"{allowed}; got {', '.join(unknown)}.{close}")
         if missing:
             raise InputError(f"`{name}` must have the argument {missing[0]}; got none.")
+        if twice:
+            raise InputError(
+                f"`{name}` must have each argument once; got {twice[0]} by place and by name."
+            )
         raise InputError(f"{allowed}; got {first - ('self' in kinds)} without names.")
 
     @cached_property

@@ -25,6 +25,11 @@ def texts(ax):
     return [text.get_text() for text in ax.texts]
 
 
+def bar_labels(ax):
+    """Counts beside the colour bar, the axes that were added last."""
+    return [text.get_text() for text in ax.figure.axes[-1].get_yticklabels()]
+
+
 def distance_from(line, place):
     along = np.diff(line, axis=0)
     share = np.sum((place - line[:-1]) * along, axis=1) / np.maximum(
@@ -98,11 +103,25 @@ def test_where_a_set_is_cut_is_not_counted_as_zero(capped_set):
         assert len(hatched) >= 2
         assert {patch.get_label() for patch in hatched} == {"cut at δ = 0.9 or δ = -0.9"}
         assert any("cut at" in text.get_text() for text in ax.get_legend().get_texts())
+        assert "0" not in bar_labels(ax)
         for x_l, force in ((0.4, 0.55), (0.4, -0.55), (1.38, 0.5), (0.9, 0.0)):
             known = [each.stable for each in capped_set.at(x_l=x_l, F=force)]
             empty = not (any(known) if count == "stable" else known)
             there = any(patch.get_path().contains_point((x_l, force)) for patch in hatched)
             assert there == empty
+
+
+def test_the_colour_bar_has_a_zero_where_an_empty_region_is_seen(spring_set):
+    """A fold beyond which nothing is: E' = x² − p − 1 has no root where p < −1."""
+    fold = em.EnergyStructure(
+        "x**3/3 - x - p*x + r*x/100",
+        [em.Unknown("x", 1.0, guesses=(-2, 2))],
+        [em.Parameter("p", "1", 1.0, "actuator", 0.0), em.Parameter("r", "1", 1.0, "load", 0.0)],
+    )
+    with unchecked():
+        eset = em.equilibrium_set(fold, em.Box(p=(-2, 0), r=(-1, 1)), intervals=(6, 6), checks=0)
+    assert bar_labels(plotting.parameter_plane(eset, count="stable")) == ["0", "1"]
+    assert bar_labels(plotting.parameter_plane(spring_set, count="stable")) == ["1", "2"]
 
 
 def test_parts_without_equilibria_and_covered_ones_fill_the_box(capped_set):

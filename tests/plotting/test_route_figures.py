@@ -1,5 +1,6 @@
 """Shapes, margins and film of a route."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -20,6 +21,21 @@ from equimorph.structures import Couple, PointForce, Rod, distance_to
 from equimorph.tasks.route import Route
 
 NOWHERE = Route("refused", "the goal is unstable", [])
+
+
+def test_the_number_at_the_worst_place_does_not_cross_its_limit(route):
+    """Just below a limit it stands beside its mark, else above or below."""
+    angle = route.path.states.structure.angle
+    values = angle(route.path.states)
+    steps = np.linspace(0.0, 1.0, len(route.schedule.progress))
+    values = np.interp(steps, np.linspace(0.0, 1.0, len(values)), np.abs(values))
+    route = replace(route, schedule=replace(route.schedule, descriptors={angle.name: values}))
+    peak = values.max()
+    for limit, beside in ((1.05 * peak, True), (3.0 * peak, False)):
+        ax = plotting.margins(route, within=[angle <= limit])
+        lowest = ax.figure.axes[-1]
+        (number,) = (each for each in lowest.texts if each.get_text() == f"{peak:.3g}")
+        assert (number.get_va() == "center") == beside
 
 
 def test_states_along_a_path_are_equilibria_from_its_start_to_its_end(route):

@@ -84,7 +84,7 @@ class Regions:
 
     def areas(self) -> dict[int, float]:
         """Area of the parameters with exactly k equilibria, for every k ≥ 1."""
-        at_least = [sum(_area(loop) for loop in level) for level in self.levels] + [0.0]
+        at_least = [sum(loop_area(loop) for loop in level) for level in self.levels] + [0.0]
         return {k + 1: at_least[k] - at_least[k + 1] for k in range(self.largest)}
 
 
@@ -140,8 +140,8 @@ def empty_regions(
         jump.append(np.full(len(loop) - 1, 1 if loop is frame else -1))
         first += len(loop)
     outside = regions_within(places, np.concatenate(edges), np.concatenate(jump)).levels
-    rims = [loop for loop in (outside[0] if outside else ()) if _area(loop) > 0.0]
-    holes = [loop for loop in (outside[0] if outside else ()) if _area(loop) <= 0.0]
+    rims = [loop for loop in (outside[0] if outside else ()) if loop_area(loop) > 0.0]
+    holes = [loop for loop in (outside[0] if outside else ()) if loop_area(loop) <= 0.0]
     return [[rim, *(hole for hole in holes if _is_inside(hole, rim))] for rim in rims]
 
 
@@ -246,7 +246,7 @@ def _loops(
     return loops
 
 
-def _area(loop: Float[np.ndarray, "n 2"]) -> float:
+def loop_area(loop: Float[np.ndarray, "n 2"]) -> float:
     """Signed area inside a closed loop, relative to its first vertex to keep digits."""
     spokes = loop - loop[0]
     return float(cross(spokes[:-1], spokes[1:]).sum() / 2)

@@ -12,7 +12,7 @@ from scipy import ndimage
 from scipy.spatial import cKDTree
 
 from equimorph.arrays import Float
-from equimorph.charts.regions import Regions, empty_regions
+from equimorph.charts.regions import Regions, empty_regions, loop_area
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Constraint
 from equimorph.plotting import style
@@ -96,12 +96,22 @@ def write_counts(
                 text.set_path_effects(style.rim(1.5, shades[number]))
 
 
-def count_bar(ax: Axes, largest: int, what: str) -> None:
+def least_count(eset: EquilibriumSet, regions: Regions, hatched: Sequence[PathPatch]) -> int:
+    """Zero where regions without equilibria can be seen that are not hatched, else one."""
+    box = float(np.prod(eset.box.upper - eset.box.lower))
+    patches = [loop for patch in hatched for loop in patch.get_path().to_polygons()]
+    hidden = sum(loop_area(np.asarray(loop)) for loop in patches)
+    bare = box - sum(regions.areas().values()) - hidden
+    return 0 if bare > _INVISIBLE * box or not regions.largest else 1
+
+
+def count_bar(ax: Axes, least: int, largest: int, what: str) -> None:
     """Colour bar with one shade per count."""
-    shades = ListedColormap(style.count_shades(largest))
-    norm = BoundaryNorm(np.arange(largest + 2) - 0.5, largest + 1)
+    counts = list(range(least, largest + 1))
+    shades = ListedColormap(style.count_shades(largest)[least:])
+    norm = BoundaryNorm(np.arange(least, largest + 2) - 0.5, len(counts))
     bar = style.colour_bar(ax, ScalarMappable(norm, shades), what)
-    bar.set_ticks(list(range(largest + 1)), labels=[str(k) for k in range(largest + 1)])
+    bar.set_ticks(counts, labels=[str(k) for k in counts])
     bar.ax.tick_params(length=0)
 
 

@@ -21,6 +21,7 @@ from equimorph.plotting.counts import (
     count_bar,
     hatch_cut,
     label_of_counts,
+    least_count,
     shade_regions,
     write_counts,
 )
@@ -137,7 +138,8 @@ def parameter_plane(
             )
         write_counts(ax, regions, largest, covered, hatched)
         what = "equilibria" if count == "all" else "stable equilibria"
-        count_bar(ax, largest, label_of_counts(what, eset.constraints))
+        least = least_count(eset, regions, hatched)
+        count_bar(ax, least, largest, label_of_counts(what, eset.constraints))
         entries = [*lines, *hatched[:1]]
         style.legend_below(ax, entries, room=own)
     return ax

@@ -29,6 +29,8 @@ _ROOM = (0.58, 0.38, 0.1, 0.2)
 _UNIT = re.compile(r"\([^()]*\)$")
 _MOST_NUMBERS = 12
 """Largest number of way points that are numbered one by one."""
+_NUMBER = 0.2
+"""Height that a number needs beside its mark, as a fraction of the panel."""
 
 
 @check_arguments
@@ -79,10 +81,10 @@ def margins(route: Route, ax: Axes | None = None, *, within: Sequence[Constraint
             _draw(lowest, schedule, values, _CURVATURE_COLOUR, snaps)
             lowest.set_ylabel(descriptor_label(descriptor))
             _draw_limits(lowest, values, limits)
-            _mark(lowest, schedule, int(np.argmax(np.abs(values))), values)
+            _mark(lowest, schedule, int(np.argmax(np.abs(values))), values, limits)
             panels.append(lowest)
         _wrap(panels)
-        lowest.set_xlabel("share of the length of the route")
+        lowest.set_xlabel("fraction of the route length")
         _number_way_points(ax, schedule, corner_steps(route))
     return ax
 
@@ -154,17 +156,25 @@ def _mark(
     schedule: Schedule,
     step: int,
     values: Float[np.ndarray, " steps"],
+    limits: Sequence[float] = (),
 ) -> None:
-    """Mark the worst step with its value, on the side of the curve where there is room."""
+    """Mark the worst step with its value, on the side of the curve where there is room.
+
+    Below a limit that the number would cross it stands beside the mark.
+    """
     is_low = values[step] <= values.mean()
+    room = _NUMBER * float(np.ptp(ax.get_ylim()))
+    crossed = any(0.0 < limit - values[step] < room for limit in limits)
     above = not is_low or values[step] < 0.15 * ax.get_ylim()[1]
     place = (float(schedule.progress[step]), float(values[step]))
     ax.plot(*place, "o", markersize=3.5, color=style.INK, zorder=4, clip_on=False)
     # Text near the end of the route is set to the left of its mark, to stay inside the frame.
-    side = "right" if place[0] > 0.8 else "left" if place[0] < 0.2 else "center"
+    side = "right" if place[0] > 0.8 else "left" if place[0] < 0.2 or crossed else "center"
+    across = 0.0 if not crossed else -5.0 if side == "right" else 5.0
     ax.annotate(
-        f"{place[1]:.3g}", place, (0, 4 if above else -4), textcoords="offset points", ha=side,
-        va="bottom" if above else "top", zorder=5,
+        f"{place[1]:.3g}", place, (across, (4 if above else -4) if not crossed else 1),
+        textcoords="offset points", ha=side,
+        va="center" if crossed else "bottom" if above else "top", zorder=5,
     )  # fmt: skip
 
 
@@ -230,7 +240,7 @@ def schedule_strips(schedule: Schedule) -> Figure:
             top -= _GROUPS
         lowest = figure.axes[-1]
         lowest.tick_params(labelbottom=True, length=2.5)
-        lowest.set_xlabel("share of the length of the route")
+        lowest.set_xlabel("fraction of the route length")
     return figure
 
 
