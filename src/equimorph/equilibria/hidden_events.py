@@ -77,6 +77,8 @@ def _before_ends(curve: Curve, points: Points, outcome: Traces) -> Events:
     p = curve.take(points.lanes[last]).parameters(points.t[last])
     index = curve.structure.index(np.ascontiguousarray(points.z[last]), p)
     off = index != points.index[last]
+    if not off.any():
+        return Events.join([], curve.structure.size)
     last, index = last[off], index[off]
     lanes = points.lanes[last]
     here = curve.take(lanes)
