@@ -8,7 +8,7 @@ INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no
 # One thread per worker in the linear algebra library: two workers share the machine.
 QUIET_THREADS := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 
-.PHONY: run paper test kernels test-slow lint docs lock bench explorer clean
+.PHONY: run paper test kernels test-slow lint docs lock bench bench-all explorer clean
 
 run: $(INSTALLED)
 	$(BIN)/equimorph run examples/arch.toml
@@ -46,6 +46,10 @@ lock:
 	    --no-header --no-annotate --output-file requirements-dev.lock
 
 bench: $(INSTALLED)
+	$(BIN)/python benchmarks/report.py results/bench.json $(if $(BEFORE),--before $(BEFORE)) $(GROUPS)
+
+# Many more cases, in tables.
+bench-all: $(INSTALLED)
 	$(BIN)/python -m pytest -o addopts="--import-mode=importlib" -p no:xdist --benchmark-only benchmarks
 
 # The program of the explorer's page, for whoever changes it: needs node, which nothing else does.

@@ -223,7 +223,7 @@ def table(
         "# Performance", "",
         f"{machine()}; warm; least of several runs;",
         "the default rod (6 elements of degree 9) unless said. Written by",
-        "`benchmarks/growth.py`; `make bench` runs the benchmarks.",
+        "`benchmarks/growth.py`; `make bench-all` runs the benchmarks.",
         "", "| what | how many | time | per second |", "|---|---|---|---|",
     ]  # fmt: skip
     for timing in totals:
