@@ -8,8 +8,7 @@ import pytest
 import equimorph as em
 from equimorph.paper import arch_maps, reproduction
 from equimorph.paper.examples import EXAMPLES, Example
-from equimorph.paper.quoted import QUOTED, TABLES
-from equimorph.paper.reproduction import in_words
+from equimorph.paper.reproduction import QUOTED, TABLES, in_words
 from typecheck import unchecked
 
 COARSE = em.Grid(Theta=(0.3, 1.5, 11), Delta=(-1.4, 1.4, 14))

@@ -12,7 +12,7 @@ from PIL import Image
 from equimorph import plotting
 from equimorph.errors import InputError
 from equimorph.plotting import style
-from equimorph.plotting.moving import suffixes
+from equimorph.plotting.film import suffixes
 from equimorph.storage import read_results, read_schedule
 from equimorph.study import Outcome, run_study
 from studies import only_route

@@ -9,7 +9,7 @@ import pytest
 
 import equimorph as em
 from equimorph.equilibria import settle
-from equimorph.tasks.planning.corridors import chance_of_missing, narrowest_excluded
+from equimorph.tasks.planning.sampling import chance_of_missing, narrowest_excluded
 from typecheck import unchecked
 
 WIDTH = 0.004

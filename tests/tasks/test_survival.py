@@ -177,7 +177,7 @@ def over_the_cusp(spring_set):
 
 def test_plan_says_why_no_route_survives(spring_set, monkeypatch):
     monkeypatch.setattr("equimorph.tasks.verification.tube.MOST_CELLS", 100)
-    monkeypatch.setattr("equimorph.tasks.planning.surviving_routes.FLOORS", ())
+    monkeypatch.setattr("equimorph.tasks.planning.planner.FLOORS", ())
     upper, lower = over_the_cusp(spring_set)
     never = em.plan(spring_set, upper, lower, survive={"F": 0.1})
     assert "no route can survive: `start` itself does not" in never.why

@@ -7,8 +7,7 @@ import numpy as np
 
 from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Flags, Values
-from equimorph.control.belief import Belief, ControlStatus
-from equimorph.control.estimate import Estimate, Measurement, fitted
+from equimorph.control.estimate import Belief, ControlStatus, Estimate, Measurement, fitted
 from equimorph.control.likely import Bundles, LikelyLoads, moved, positions
 from equimorph.control.safe_routes import route_is_safe, safe_route
 from equimorph.control.strides import MovingTarget, Step, Strides, ahead_of, setting_of

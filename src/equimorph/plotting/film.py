@@ -1,5 +1,9 @@
-"""A film of a structure that follows a route, next to its point in a plane."""
+"""Films as GIF or MP4: a structure that follows a route, next to its point in a plane."""
 
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path as FilePath
 from typing import Any, NamedTuple
@@ -17,6 +21,7 @@ from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Float, Values
 from equimorph.charts.regions import count_equilibria
 from equimorph.equilibria import EnergyPath, Path
+from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Constraint, position
 from equimorph.plotting import style
@@ -24,12 +29,93 @@ from equimorph.plotting.counts import hatch_cut, shade_regions
 from equimorph.plotting.curves import path_of, states_along, track
 from equimorph.plotting.depth import draw_triad
 from equimorph.plotting.labels import descriptor_label, parameter_label, symbol
-from equimorph.plotting.moving import film_file, write_film
 from equimorph.plotting.plane import draw_folds, draw_track, frame_plane
 from equimorph.plotting.surroundings import Moving, Surroundings, frame_shapes, obstacles_of
 from equimorph.plotting.transitions import energy_path
 from equimorph.structures import States
 from equimorph.tasks.route import Route
+
+COLOURS = 64
+"""Size of the palette that all pictures share."""
+PAUSE_FIRST, PAUSE_LAST = 0.8, 1.6
+"""Seconds for which the first and the last picture are shown."""
+HUNDREDTHS = 10
+"""Milliseconds in a hundredth of a second, the unit of time in GIF files."""
+EVEN = "pad=ceil(iw/2)*2:ceil(ih/2)*2"
+"""Filter of ffmpeg: players expect even numbers of pixels."""
+
+
+def film_file(path: str | FilePath) -> FilePath:
+    """Return the path of a film that can be written here.
+
+    Raises
+    ------
+    InputError
+        If it is neither a GIF nor, with ffmpeg at hand, an MP4.
+    """
+    file = FilePath(path)
+    kinds = suffixes()
+    if file.suffix.lower() not in kinds:
+        missing = "" if len(kinds) > 1 else " (.mp4 needs the program ffmpeg)"
+        raise InputError(
+            f"`path` of a film must end in {' or '.join(kinds)}{missing}; got {file.name!r}."
+        )
+    return file
+
+
+def suffixes() -> tuple[str, ...]:
+    """Kinds of files that films can be written to on this machine."""
+    return (".gif", ".mp4") if shutil.which("ffmpeg") else (".gif",)
+
+
+def write_film(pictures: Sequence[Image.Image], file: FilePath, fps: int) -> None:
+    """Write pictures as a film; the first and the last one stay longer.
+
+    Parameters
+    ----------
+    pictures
+        All of one size.
+    file
+        What `film_file` returned.
+    fps
+        Pictures per second, at most 50.
+    """
+    each = max(2, round(100 / fps)) * HUNDREDTHS
+    shown = [int(1000 * PAUSE_FIRST), *[each] * (len(pictures) - 2), int(1000 * PAUSE_LAST)]
+    if file.suffix.lower() == ".gif":
+        _write_gif(pictures, file, shown)
+        return
+    with tempfile.TemporaryDirectory() as folder:
+        still = FilePath(folder, "film.gif")
+        _write_gif(pictures, still, shown)
+        convert(still, file)
+
+
+def convert(gif: FilePath, mp4: FilePath) -> None:
+    """Write a GIF as an MP4 by ffmpeg.
+
+    Raises
+    ------
+    OSError
+        If ffmpeg cannot, with its last line.
+    """
+    command = ["ffmpeg", "-y", "-loglevel", "error", "-i", str(gif), "-vf", EVEN]
+    command += ["-pix_fmt", "yuv420p", "-movflags", "+faststart", str(mp4)]
+    ran = subprocess.run(command, capture_output=True, text=True, check=False)
+    if ran.returncode:
+        raise OSError(f"ffmpeg cannot write {mp4.name}: {ran.stderr.strip().splitlines()[-1]}")
+
+
+def _write_gif(pictures: Sequence[Image.Image], file: FilePath, durations: list[int]) -> None:
+    """Write an endless GIF with one palette, so that still parts cost nothing."""
+    # The palette is made from pictures all along the way: none of the colours is missed.
+    sample = [np.asarray(pictures[k]) for k in np.linspace(0, len(pictures) - 1, 4).astype(int)]
+    palette = Image.fromarray(np.concatenate(sample)).quantize(COLOURS, Image.Quantize.MAXCOVERAGE)
+    reduced = [each.quantize(palette=palette, dither=Image.Dither.NONE) for each in pictures]
+    reduced[0].save(
+        file, save_all=True, append_images=reduced[1:], duration=durations, loop=0, optimize=False
+    )
+
 
 _WIDTH, _HEIGHT, _DOTS = 6.4, 3.1, 120
 """Inches of a frame, and pixels per inch."""

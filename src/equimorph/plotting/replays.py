@@ -14,7 +14,7 @@ from equimorph.arrays import Float
 from equimorph.dynamics import Replay
 from equimorph.plotting import style
 from equimorph.plotting.depth import viewpoint_of
-from equimorph.plotting.moving import film_file, write_film
+from equimorph.plotting.film import film_file, write_film
 from equimorph.tasks.timing.speed import SpeedLimit
 
 _SMALLEST = 1e-4

@@ -23,7 +23,7 @@ from rich.markup import escape as plain
 from equimorph import plotting
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Constraint, Descriptor, Progress, Schedule, Workers
-from equimorph.plotting.moving import convert, suffixes
+from equimorph.plotting.film import convert, suffixes
 from equimorph.storage import write_schedule
 from equimorph.storage.files import write_csv
 from equimorph.structures import Structure

@@ -1,12 +1,78 @@
-"""Planar rods as structures: fields along the rod in the user's units."""
+"""Fields along planar rods in the user's units; strain, stress and safety of rods with a section.
+
+Stresses are those of bending and twist, see `fibres`. Axial stresses of an inextensible rod are
+smaller by t/(6 L), shear of forces across it by t/L: both are left out.
+"""
+
+from abc import abstractmethod
+from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 
 from equimorph.arrays import Float, Lanes, Parameters, Values, Velocity
-from equimorph.structures.rod.any_rod import Arclengths
+from equimorph.errors import MissingError
+from equimorph.structures.contract import Readers, Written
+from equimorph.structures.rod.any_rod import AnyRod, Arclengths
 from equimorph.structures.rod.centreline import Centreline
+from equimorph.structures.rod.fibres import Fibres
 from equimorph.structures.rod.mechanics import PlanarMechanics
-from equimorph.structures.rod.stresses import StressedRod
+from equimorph.structures.rod.rod_description import RodDescription
+from equimorph.structures.rod.terms import Curvature
+from equimorph.structures.stressed import Stressed
+from equimorph.structures.unit_system import UnitSystem
+
+FREE = ("stiffness", "curvature", "side_curvature", "natural_twist")
+"""Profiles that have their defaults in a uniform rod that is straight when free of stress."""
+
+
+class StressedRod(Stressed, AnyRod):
+    """A rod with descriptors of strain, stress and safety, which need the size of its section."""
+
+    written: ClassVar[Written] = {**AnyRod.written, **Stressed.written}
+    readers: ClassVar[Readers] = {**AnyRod.readers, **Stressed.readers}
+
+    @property
+    @abstractmethod
+    def description(self) -> RodDescription:
+        """The rod as its user describes it."""
+
+    @property
+    def own_system(self) -> UnitSystem:
+        """Units of the rod."""
+        return self.units.system
+
+    @cached_property
+    def fibres(self) -> Fibres:
+        """Fibres with the largest strains and stresses.
+
+        Raises
+        ------
+        MissingError
+            If there is no section of a shape, or the curvature is not that of bending alone.
+        """
+        section = self.space_options.section
+        fibres = None if section is None else section.fibres(self.stress_system)
+        if fibres is None:
+            raise MissingError(
+                "`max_strain` must be that of a rod with a section, like Rod(section=Strip(...), "
+                "length=...), Round or Tube; got a rod without the size of its section."
+            )
+        if not self.is_straight_when_free:
+            raise MissingError(
+                "`max_strain` must be that of a uniform rod that is straight when free of stress; "
+                "got one with its own curvature, a curvature load or a profile of stiffness. Bound "
+                "its curvature instead."
+            )
+        return fibres
+
+    @property
+    def is_straight_when_free(self) -> bool:
+        """Whether the rod is uniform, and straight where it is free of stress."""
+        own, usual = self.description.profiles, self.description.defaults
+        same = all(own[name] == usual[name] for name in FREE if name in usual)
+        loads = (one for terms in self.terms.values() for one in terms)
+        return same and not any(isinstance(one, Curvature) for one in loads)
 
 
 class Measured(StressedRod):

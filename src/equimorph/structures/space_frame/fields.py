@@ -9,11 +9,11 @@ from equimorph.arrays import Float, Lanes, Parameters
 from equimorph.model import Support
 from equimorph.model.drawing import supports_of_point
 from equimorph.structures.frame.any_frame import AnyFrame
+from equimorph.structures.frame.statics import SpaceFlows
 from equimorph.structures.frame.strength import Nodal, NodalStrains
 from equimorph.structures.space_frame.mechanics import SpatialFrameMechanics
 from equimorph.structures.space_frame.model import SpatialFrameModel
 from equimorph.structures.space_frame.network import SpatialNetwork, Turning
-from equimorph.structures.space_frame.statics import SpaceFlows
 from equimorph.structures.spatial.quaternions import (
     RIGHT,
     exponential,

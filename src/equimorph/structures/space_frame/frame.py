@@ -14,7 +14,7 @@ from equimorph.model import Descriptor, remember_call
 from equimorph.structures.contract import Readers, Symmetry, Written
 from equimorph.structures.discrete import STEPS, SURE
 from equimorph.structures.frame.any_model import Actuators, Loads, Patterns
-from equimorph.structures.frame.images import find_images
+from equimorph.structures.frame.images import SpatialImage, find_images
 from equimorph.structures.network import Joints
 from equimorph.structures.newton import newton
 from equimorph.structures.space_frame.fields import SpatialFrameFields
@@ -22,7 +22,6 @@ from equimorph.structures.space_frame.mechanics import SpatialFrameMechanics
 from equimorph.structures.space_frame.member import SpatialMemberSpec, SpatialSupportSpec
 from equimorph.structures.space_frame.model import SpatialFrameModel
 from equimorph.structures.space_frame.network import spatial_network
-from equimorph.structures.space_frame.symmetries import SpatialImage
 from equimorph.structures.stressed import Stressed
 from equimorph.structures.unit_system import Units, unit_system
 

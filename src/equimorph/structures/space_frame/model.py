@@ -8,8 +8,8 @@ import numpy as np
 
 from equimorph.arrays import Bool, Float, Int
 from equimorph.structures.frame.any_model import AnyFrameModel
+from equimorph.structures.frame.statics import NOTHING, SpaceFlows, SpaceStatics
 from equimorph.structures.space_frame.network import SpatialNetwork, Turning
-from equimorph.structures.space_frame.statics import NOTHING, SpaceFlows, SpaceStatics
 from equimorph.structures.spatial.quaternions import exponential, matrices
 
 LENGTH_STIFFNESS = 4000.0

@@ -16,9 +16,14 @@ from equimorph.arrays import Float
 from equimorph.errors import InputError
 from equimorph.structures import State, Structure
 from equimorph.tasks.designing.bounds import Asked, DesignBound
-from equimorph.tasks.designing.bundle import DesignProblem, Judged
 from equimorph.tasks.designing.family import Bounds, DesignFamily
-from equimorph.tasks.designing.search import DesignSearch, DesignStatus, DesignStep
+from equimorph.tasks.designing.search import (
+    DesignProblem,
+    DesignSearch,
+    DesignStatus,
+    DesignStep,
+    Judged,
+)
 
 EQUILIBRIUM = 1e-6
 """Residual up to which states are equilibria."""

@@ -13,7 +13,7 @@ from equimorph.arrays import Float, Lanes, Parameters
 from equimorph.columns import Columns
 from equimorph.linalg.intervals import Interval, join, product
 from equimorph.structures import Enclosed, States, Structure
-from equimorph.tasks.verification.sampled_bounds import sampled_enclosure
+from equimorph.tasks.verification.evidence import sampled_enclosure
 
 Responses = Float[np.ndarray, "lanes m size"]
 
