@@ -338,7 +338,7 @@ from .tasks.robustness.room import (
     stable_room as stable_room,
     Room as Room,
 )
-from .tasks.verification.box_proof import (
+from .tasks.verification.proof import (
     certify_box as certify_box,
     BoxProof as BoxProof,
 )

@@ -218,7 +218,7 @@ class Entry:
             pass
         named = [{name: value}] if name not in self._kinds else _mappings(value) * kind.by_name
         owners = [each for key, each in zip(self._names, args, strict=False) if key in self._owning]
-        said = _refused_by_parameters(named, owners)
+        said = _complaint_of_parameters(named, owners)
         said = said or f"`{name}` must be {kind.words}; got {kind.refused(value)}."
         raise InputError(f"{said}{self._remedy(name, value)}")
 
@@ -288,7 +288,7 @@ def _mappings(value: Any) -> list[Mapping[Any, Any]]:
     return [each for each in (value if listed else [value]) if isinstance(each, Mapping)]
 
 
-def _refused_by_parameters(named: Sequence[Mapping[Any, Any]], given: Sequence[Any]) -> str:
+def _complaint_of_parameters(named: Sequence[Mapping[Any, Any]], given: Sequence[Any]) -> str:
     """What the parameters of the first structure among the arguments say of their values."""
     structures = (each for each in map(structure_of, given) if each is not None)
     for parameter in getattr(next(structures, None), "parameters", ()):

@@ -109,7 +109,7 @@ def kind_of(annotation: Any, name: str) -> Kind:
     origin = get_origin(annotation)
     if origin is Annotated:
         plain, note, *_ = get_args(annotation)
-        return _noted(plain, note, name)
+        return _kind_of_note(plain, note, name)
     if origin in (Union, types.UnionType):
         return _either([kind_of(each, name) for each in get_args(annotation)])
     for applies, make in MAKERS:
@@ -118,7 +118,7 @@ def kind_of(annotation: Any, name: str) -> Kind:
     return ANYTHING
 
 
-def _noted(plain: Any, note: Any, name: str) -> Kind:
+def _kind_of_note(plain: Any, note: Any, name: str) -> Kind:
     """Kind of an annotation that says more than its type."""
     if isinstance(note, Kind):
         return note

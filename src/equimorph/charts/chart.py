@@ -155,7 +155,7 @@ class Chart(ABC):
             If a point has another number of coordinates, or a value is not finite.
         """
         points = self._check_width(coords)
-        found = self._found(points)
+        found = self._find_states(points)
         count = np.bincount(found.point, minlength=len(points))
         code = np.full(len(points), PointStatus.GAP)
         code[count == 1] = PointStatus.INSIDE
@@ -202,7 +202,7 @@ class Chart(ABC):
         gap[own] = np.linalg.norm(found - theirs, axis=1)
         return np.asarray(gap <= 10.0 * SAME_STATE)
 
-    def _found(self, points: Points) -> Found:
+    def _find_states(self, points: Points) -> Found:
         """All states of the chart's cells over points."""
         return self.cells.find(points)
 
@@ -338,9 +338,9 @@ class DescriptorChart(Chart):
         states = self.singular.states
         return SingularPairs(self.cells, states) if len(states) else None
 
-    def _found(self, points: Points) -> Found:
+    def _find_states(self, points: Points) -> Found:
         """All states of the chart's cells over points, and of pairs that lie beside these cells."""
-        found = super()._found(points)
+        found = super()._find_states(points)
         return found if self._pairs is None else self._pairs.add_to(found, points)
 
     @cached_property

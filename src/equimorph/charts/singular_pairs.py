@@ -121,7 +121,7 @@ class SingularPairs:
     def add_to(self, found: Found, points: Points) -> Found:
         """States found over points, and those of pairs beside the singular states."""
         setting, structure = self.coordinates.setting, self.states.structure
-        point, near, step = self._predicted(points)
+        point, near, step = self._predict(points)
         tangent = np.einsum("nd,ndf->nf", step, self._frames[near])
         dz, dp = split_step(setting, tangent)
         start = self.states[near]
@@ -136,13 +136,13 @@ class SingularPairs:
         new = Found(
             states[good], point[good], self.cells.numbers[cell[good]], np.zeros(good.sum(), bool)
         )
-        return _united(self.cells, found, new)
+        return _unite(self.cells, found, new)
 
     @property
     def _longest(self) -> float:
         return REACH * float(self.cells.sizes.max())
 
-    def _predicted(self, points: Points) -> tuple[Numbers, Numbers, Places]:
+    def _predict(self, points: Points) -> tuple[Numbers, Numbers, Places]:
         """Points with a pair near by, the singular states it is predicted from, and the steps."""
         count, d = min(NEIGHBOURS, len(self.states)), points.shape[1]
         scaled, bend = points / self._ranges, self._bend
@@ -165,7 +165,7 @@ class SingularPairs:
         return np.tile(point[good], 2), np.tile(near[good], 2), both
 
 
-def _united(cells: Cells, first: Found, second: Found) -> Found:
+def _unite(cells: Cells, first: Found, second: Found) -> Found:
     """States of both, equal ones once, sorted by point."""
     states = join_states(first.states.structure, [first.states, second.states])
     point, cell, inside = (

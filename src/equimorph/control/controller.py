@@ -175,7 +175,7 @@ class Controller:
             followed = replace(here, way_points=tuple(self.goal.way_points))
             if self._follows_safely(followed, likely, place):
                 return followed
-        planned = self._replanned(here, likely, place)
+        planned = self._replan(here, likely, place)
         is_found = planned.status == ControlStatus.REPLANNED
         return replace(planned, status=ControlStatus.FOLLOWING) if is_found else planned
 
@@ -195,7 +195,7 @@ class Controller:
         InputError
             If a descriptor has no standard error, or a value is not a number.
         """
-        belief = self._estimated(belief, Measurement.of(measured, self.errors))
+        belief = self._estimate(belief, Measurement.of(measured, self.errors))
         if belief.status == ControlStatus.NOT_EXPLAINED:
             return belief
         here = belief.state.p[self._actuators]
@@ -205,12 +205,12 @@ class Controller:
         if not place.safe[0]:
             return self._retreat(belief, likely)
         if self._target is not None:
-            return self._tracked(belief, likely, place, ahead)
+            return self._track(belief, likely, place, ahead)
         if self._is_stale(belief):
             if self._follows_safely(belief, likely, place):
                 belief = replace(belief, checked=belief.state.p[self._loads])
             else:
-                return self._replanned(belief, likely, place)
+                return self._replan(belief, likely, place)
         return self._strode(belief, likely, place, ahead)
 
     @check_arguments
@@ -243,7 +243,7 @@ class Controller:
 
     # what is estimated
 
-    def _estimated(self, belief: Belief, measured: Measurement) -> Belief:
+    def _estimate(self, belief: Belief, measured: Measurement) -> Belief:
         """Belief with the measurement; on another sheet if this one does not explain it."""
         prior = belief.covariance + self._drift
         if len(measured.values) == 0:
@@ -303,7 +303,7 @@ class Controller:
         gap = (there.z - states.z)[:, : self.structure.unknowns]
         return np.asarray(arrived & (gap**2 @ self.structure.mass < SAME_STATE**2))
 
-    def _replanned(self, belief: Belief, likely: LikelyLoads, place: Bundles) -> Belief:
+    def _replan(self, belief: Belief, likely: LikelyLoads, place: Bundles) -> Belief:
         """Another route over the set, safe under all likely loads."""
         goal, route = likely.under(self._goal.batch), None
         if not place.safe[0]:
@@ -342,17 +342,17 @@ class Controller:
         if ahead.there is None and self._is_goal(belief.state.batch)[0]:
             return replace(belief, status=ControlStatus.ARRIVED)
         if ahead.there is None:
-            return self._replanned(belief, likely, place)
+            return self._replan(belief, likely, place)
         stride = self._strides.towards(place, ahead, likely)
         if stride.state is not None:
             return replace(belief, state=stride.state)
-        changed = self._replanned(belief, likely, place)
+        changed = self._replan(belief, likely, place)
         if changed.status == ControlStatus.REPLANNED:
             return changed
         words = _words(belief.way_points[0])
         return replace(changed, why=f"no stride towards {words} is safe; {changed.why}")
 
-    def _tracked(self, belief: Belief, likely: LikelyLoads, place: Bundles, ahead: Step) -> Belief:
+    def _track(self, belief: Belief, likely: LikelyLoads, place: Bundles, ahead: Step) -> Belief:
         """Belief after the longest safe stride towards the next values of the moving target."""
         at, refused = self._leg(belief), replace(belief, status=ControlStatus.NO_SAFE_WAY)
         if ahead.there is None:

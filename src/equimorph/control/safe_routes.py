@@ -43,7 +43,7 @@ def safe_route(
     ends = start, goal
     found = _over(eset, ends, likely)
     if found is None and not np.allclose(likely.values[0], _loads_of(eset, likely)):
-        found = _over(_lifted_anew(eset, likely), ends, likely)
+        found = _over(_lift_anew(eset, likely), ends, likely)
     return _over(eset, ends, likely, width=0.0) if found is None else found
 
 
@@ -72,7 +72,7 @@ def _loads_of(eset: EquilibriumSet, likely: LikelyLoads) -> Values:
     return np.array([eset.fixed[names[k]] for k in likely.at])
 
 
-def _lifted_anew(eset: EquilibriumSet, likely: LikelyLoads) -> EquilibriumSet:
+def _lift_anew(eset: EquilibriumSet, likely: LikelyLoads) -> EquilibriumSet:
     """The set under the estimated loads, rounded; kept with the set."""
     scales = eset.structure.scales[likely.at]
     loads = np.round(likely.values[0] / scales, DIGITS) * scales
@@ -117,10 +117,10 @@ def _over(
         [[count - 2, count - 1]],
     ])  # fmt: skip
     path = _cheapest(nodes, pairs, likely)
-    return None if path is None else _straightened(nodes.take(path), likely)
+    return None if path is None else _straighten(nodes.take(path), likely)
 
 
-def _straightened(path: Bundles, likely: LikelyLoads) -> States:
+def _straighten(path: Bundles, likely: LikelyLoads) -> States:
     """Corners of the chain of safe straight moves between places of a path with most clearance."""
     first, second = pairs_on_path(len(path), STATIONS_WITH_MARGINS)
     good = likely.linked(path.take(first), path.take(second))

@@ -105,9 +105,9 @@ class _Grips:
     def __init__(self, linkage: Linkage, y: Settings) -> None:
         self._supports, self._length = linkage.supports, float(linkage.lengths[0, 0])
         self.time, self.duration = 0.0, 1.0
-        self.before = self.after = self._held(y)
+        self.before = self.after = self._end_poses(y)
 
-    def _held(self, y: Settings) -> Float[np.ndarray, "ends 3"]:
+    def _end_poses(self, y: Settings) -> Float[np.ndarray, "ends 3"]:
         """Place and angle of both ends."""
         held = self._supports
         places = np.einsum("nx,nxa->na", held.places @ y, held.axes)
@@ -115,7 +115,7 @@ class _Grips:
 
     def move(self, y: Settings, time: float, duration: float) -> None:
         """The next step in time, and where it ends."""
-        self.before, self.after = self.after, self._held(y)
+        self.before, self.after = self.after, self._end_poses(y)
         self.time, self.duration = time, duration
 
     def hold(self, rod: Any, time: float) -> None:
@@ -154,19 +154,19 @@ class CosseratPlant(Plant):
         self._table, self._y = linkage.forces[0], np.append(start.p, 1.0)
         self._forces = self._table @ self._y
         self._grips = _Grips(linkage, self._y)
-        rod, self._energy_scale = self._made(start), model.chained.energy
+        rod, self._energy_scale = self._build_rod(start), model.chained.energy
         element = min(1.0 / self.elements, LONGEST_ELEMENT)
         fastest = COURANT * element / np.sqrt(rod.shear_matrix[2, 2, 0])
         self._substeps = max(1, int(np.ceil(step / fastest)))
         self._rod = rod
-        self._simulator, self._stepper = self._assembled(rod, rate, step / self._substeps)
+        self._simulator, self._stepper = self._assemble(rod, rate, step / self._substeps)
 
     @property
     def elements(self) -> int:
         """Number of elements."""
         return self._model.elements
 
-    def _made(self, start: State) -> Any:
+    def _build_rod(self, start: State) -> Any:
         """The rod in the shape of a state."""
         linkage, elements = self._model.chained.linkage, self.elements
         h = float(linkage.lengths[0, 0])
@@ -189,7 +189,7 @@ class CosseratPlant(Plant):
         rod.inv_mass_second_moment_of_inertia /= ROTARY
         return rod
 
-    def _assembled(self, rod: Any, rate: float, step: float) -> tuple[Any, Any]:
+    def _assemble(self, rod: Any, rate: float, step: float) -> tuple[Any, Any]:
         """Simulator with grips, loads and damping, and its integrator."""
         ea, plant, grips = elastica_module(), self, self._grips
 

@@ -77,14 +77,14 @@ class DirectModel(Model):
         if bend < 0.0:
             drive, bend = -drive, -bend
         inertia = float(structure.inertia_product(z, p)(wide[None, None, :n])[0, 0] @ wide[:n])
-        apart = self.reference(_moved(fold, PROBE * wide)) - self.reference(
-            _moved(fold, -PROBE * wide)
+        apart = self.reference(_move(fold, PROBE * wide)) - self.reference(
+            _move(fold, -PROBE * wide)
         )
         reach = float(np.linalg.norm(apart[0], axis=1).max()) / (2.0 * PROBE)
         return FoldDelay(inertia, self.resistance(z, p, wide[:n], damping), drive, bend, reach)
 
 
-def _moved(state: State, by: Float[np.ndarray, " size"]) -> States:
+def _move(state: State, by: Float[np.ndarray, " size"]) -> States:
     return States(state.structure, (state.z + by)[None], state.p[None])
 
 

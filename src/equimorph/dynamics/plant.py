@@ -128,11 +128,11 @@ class LinkagePlant(Simulation):
         self._force, self._couple = np.zeros((len(self._hinge), 2)), np.zeros(len(self._hinge))
         self._total = np.zeros(len(self._floats))
         self._pushed = np.array([at for at, _, _ in self._floats], dtype=int)
-        self._drives = self._driven(writer)
+        self._drives = self._find_drives(writer)
         self._changing: dict[bytes, list[_Drive]] = {}
         self._qpos, self._applied = self.data.qpos, self.data.qfrc_applied
 
-    def _driven(self, writer: Writer) -> list[_Drive]:
+    def _find_drives(self, writer: Writer) -> list[_Drive]:
         """All that the settings change: rests of springs, places of supports, loads."""
         model, linkage, tree = self.model, self.linkage, self.tree
         couples = np.zeros((len(tree.bodies), linkage.couples.shape[1]))

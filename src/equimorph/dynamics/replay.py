@@ -304,7 +304,7 @@ def _judge(
     last = float(_away(times, points, times, course)[-1])
     fold = course.fold
     # at rest where the branch has no equilibrium, it is on another one, however near
-    gone = _folded(fold) or last > DEPARTURE * size or _elsewhere(plant, course, size)
+    gone = _is_fold(fold) or last > DEPARTURE * size or _elsewhere(plant, course, size)
     departure, where = PART_OF_SNAP * last, None
     if gone:
         everywhere = np.array([plant.points_at(each) for each in record.places])
@@ -321,7 +321,7 @@ def _judge(
     )  # fmt: skip
 
 
-def _folded(fold: float | None) -> bool:
+def _is_fold(fold: float | None) -> bool:
     return fold is not None and bool(np.isfinite(fold))
 
 

@@ -232,7 +232,7 @@ class _Trial:
         """Rates of the modes that a momentum gives; these obey the constraints."""
         return np.asarray(self._modes.T @ (self._modes @ momentum))
 
-    def _pushed_off(self, sizes: Values, velocity: np.ndarray) -> Launches:
+    def _push_off(self, sizes: Values, velocity: np.ndarray) -> Launches:
         """The state with multiples of velocities."""
         many = np.ones((len(sizes), 1))
         home, level = many * self.state.z, np.full(len(sizes), self.level)
@@ -242,7 +242,7 @@ class _Trial:
         """Impulses in units of the one that gives a velocity, from the bound on; its energy."""
         energy = 0.5 * float(velocity @ self.mass @ velocity)
         bound = float(np.sqrt(self.height / energy))
-        sizes = _Sizes(bound, LARGEST * bound, bound, lambda a: self._pushed_off(a, velocity))
+        sizes = _Sizes(bound, LARGEST * bound, bound, lambda a: self._push_off(a, velocity))
         return sizes, energy
 
     def over_the_saddle(self) -> Shock:

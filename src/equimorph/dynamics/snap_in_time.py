@@ -135,7 +135,7 @@ def snap_in_time(
     below, above = way.at(fold - apart), way.at(fold + apart)
     hold = _Hold(model, near, min(LONGEST, PATIENCE / np.sqrt(apart)), used)
     stays, _, _ = hold.run(below, used.damping)
-    there = _expected(end, start.parameters, above)
+    there = _expected_landing(end, start.parameters, above)
     beyond = []
     frequency = float(start.batch.natural_frequencies(1)[0, 0]) * model.unit
     for ratio in dampings:
@@ -154,7 +154,7 @@ def _state_at(start: State, way: TimedCorners, time: float) -> State:
     return follow_polyline(start, rows, (), FINE).end.state
 
 
-def _expected(
+def _expected_landing(
     end: Event, names: Mapping[str, float], row: Float[np.ndarray, " parameters"]
 ) -> State | None:
     """Where the gradient flow lands at the end of a branch, followed to the parameters of a row."""

@@ -174,13 +174,13 @@ def read_lines(
         raise InputError(f"`{file.name}` must have finite coordinates; got others.")
     size = float(np.ptp(segments.reshape(-1, 3), axis=0).max())
     reach = SAME_PLACE * size if tolerance is None else tolerance
-    places, ends = _joined(segments, reach)
+    places, ends = _join(segments, reach)
     axes = _axes(places, plane, reach)
     kept = [AXES.index(axis) for axis in axes]
     return Lines(np.ascontiguousarray(places[:, kept]), ends, unit or drawing.unit, axes)
 
 
-def _joined(
+def _join(
     segments: Float[np.ndarray, "segments 2 3"], reach: float
 ) -> tuple[Float[np.ndarray, "joints 3"], Int[np.ndarray, "lines 2"]]:
     """Joints in the order of the lines, and which two each line joins; each pair once."""

@@ -75,7 +75,7 @@ def _read(path: Path) -> tuple[Quoted, ...]:
     )
 
 
-QUOTED = _read(Path(__file__).with_suffix(".csv"))
+QUOTED = _read(Path(__file__).with_name("quoted.csv"))
 
 TABLES = (
     QuotedTable(

@@ -73,9 +73,9 @@ def route_panels(
         plane, shapes = figure.add_axes(_PLANE), figure.add_axes(_SHAPES)
         surface(eset, height_descriptor, solid, route, limit=limit)
         solid.set_box_aspect(ASPECT, zoom=_ZOOM)
-        entries = {each.get_label(): each for each in _taken_legend(solid)}
+        entries = {each.get_label(): each for each in _take_legend(solid)}
         parameter_plane(eset, route, plane, count="stable", limit=limit)
-        entries |= {e.get_label(): e for e in _taken_legend(plane) if isinstance(e, PathPatch)}
+        entries |= {e.get_label(): e for e in _take_legend(plane) if isinstance(e, PathPatch)}
         states = route.path.states[corner_steps(route)]
         corners = np.column_stack([track(eset, states), height_descriptor(states)])
         number_in_space(solid, corners)
@@ -88,7 +88,7 @@ def route_panels(
     return figure
 
 
-def _taken_legend(ax: Axes) -> list[Artist]:
+def _take_legend(ax: Axes) -> list[Artist]:
     """Take the legend of a panel away, and return its entries."""
     legend = ax.get_legend()
     assert legend is not None

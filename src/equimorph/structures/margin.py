@@ -134,7 +134,7 @@ def _above(
         if len(at) == 0:
             break
         bounds = low[at], high[at]
-        low[at], high[at] = _halved(structure, z[at], p[at], *bounds, halvings)
+        low[at], high[at] = _bisect(structure, z[at], p[at], *bounds, halvings)
         value[at], proved[at] = _by_pairs(structure, z[at], p[at], error, low[at])
     return value, proved
 
@@ -205,18 +205,18 @@ def _by_bisection(
     Where that does not converge, bisection goes on to round-off; not a number where no bounds hold.
     """
     low, high = _bracket(structure, z, p)
-    low, high = _halved(structure, z, p, low, high, FIRST_HALVINGS)
+    low, high = _bisect(structure, z, p, low, high, FIRST_HALVINGS)
     value, good = _polish(structure, z, p, low, high)
     rest = np.flatnonzero(~good)
     if len(rest):
         low, high = (each[rest] for each in (low, high))
-        low, high = _halved(structure, z[rest], p[rest], low, high, ALL_HALVINGS)
+        low, high = _bisect(structure, z[rest], p[rest], low, high, ALL_HALVINGS)
         below, above = (_count_below(structure, z[rest], p[rest], each) for each in (low, high))
         value[rest] = np.where((below == 0) & (above > 0), 0.5 * (low + high), np.nan)
     return value
 
 
-def _halved(
+def _bisect(
     structure: Pencil, z: Lanes, p: Parameters, low: Values, high: Values, times: int
 ) -> tuple[Values, Values]:
     """Bounds of the smallest eigenvalue after bisections on the count of those below."""

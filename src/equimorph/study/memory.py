@@ -46,7 +46,7 @@ def estimated_memory(size: int, intervals: tuple[int, ...]) -> float:
 
 def available_memory() -> float:
     """Bytes that this process may still take: what the machine has left, or its group's limit."""
-    return min(_left_on_machine(), _left_in_group())
+    return min(_room_on_machine(), _room_in_group())
 
 
 def check_memory(problem: Problem) -> float:
@@ -108,7 +108,7 @@ def amount(size: float) -> str:
     return f"{size / 1e9:.2f} GB" if size < 1e11 else f"{size / 1e9:.1e} GB"
 
 
-def _left_on_machine() -> float:
+def _room_on_machine() -> float:
     try:
         lines = Path("/proc/meminfo").read_text(encoding="ascii").splitlines()
         sizes = {line.partition(":")[0]: line.split()[1] for line in lines}
@@ -117,7 +117,7 @@ def _left_on_machine() -> float:
         return float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
 
 
-def _left_in_group() -> float:
+def _room_in_group() -> float:
     """Rest below the limit of this process's control group; ∞ without one."""
     for root, limit, used in _GROUP_FILES:
         for group in (root / _own_group(root), root):

@@ -96,7 +96,7 @@ def study_schema() -> dict[str, Any]:
     """Return the JSON schema of study files."""
     schema = STUDY.model_json_schema(by_alias=True)
     definitions = schema["$defs"]
-    for section, told in _told().items():
+    for section, told in _meanings_of_keys().items():
         node = schema if section is STUDY else definitions.get(section.__name__)
         for key, entry in (node or {}).get("properties", {}).items():
             if key in told and "description" not in entry:
@@ -109,7 +109,7 @@ def schema_text() -> str:
     return json.dumps(study_schema(), indent=1, ensure_ascii=False) + "\n"
 
 
-def _told() -> dict[type[Section], Mapping[str, str]]:
+def _meanings_of_keys() -> dict[type[Section], Mapping[str, str]]:
     """Return what the keys of all sections mean."""
     tables = {kind.table: (kind.__doc__ or "").strip() for kind in KINDS}
     told: dict[type[Section], Mapping[str, str]] = {

@@ -149,7 +149,7 @@ def supported(found):
 
 
 def test_structures_with_too_many_unknowns_have_no_proof(monkeypatch):
-    monkeypatch.setattr("equimorph.tasks.verification.evidence.MOST_ENTRIES", 2)
+    monkeypatch.setattr("equimorph.tasks.verification.error_box.MOST_ENTRIES", 2)
     structure = bead_on_a_circle()
     start = structure.state(0.0, 1.0, 1.0, g=1.0)
     found = verify([{"h": 0.2}], start, proof=True)

@@ -217,7 +217,7 @@ class Described(Measured):
 
         0 where the rod stays in its plane. Arguments as of `lateral_margin`.
         """
-        block, written = self.out_of_plane(torsion, lateral), self._written(torsion, lateral)
+        block, written = self.out_of_plane(torsion, lateral), self._arguments(torsion, lateral)
         return space.lateral_index(self, block, written)
 
     @check_arguments
@@ -240,10 +240,10 @@ class Described(Measured):
             Where neither the rod nor the arguments have them, or under loads without a potential in
             space.
         """
-        block, written = self.out_of_plane(torsion, lateral), self._written(torsion, lateral)
+        block, written = self.out_of_plane(torsion, lateral), self._arguments(torsion, lateral)
         return space.lateral_margin(self, block, written, self.terms)
 
-    def _written(self, torsion: Any, lateral: Any) -> str:
+    def _arguments(self, torsion: Any, lateral: Any) -> str:
         """Arguments of a descriptor's name; none for the rod's own stiffnesses."""
         return "" if torsion is None and lateral is None else f"({torsion}, {lateral})"
 

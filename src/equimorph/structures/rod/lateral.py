@@ -233,7 +233,7 @@ class OutOfPlane:
         over_lanes(lateral_lanes, self._shared, given, [x, negative, ratio])
         unsafe = ~(ratio >= REFINABLE)
         if unsafe.any():
-            again = self._pivoted(z[unsafe], p[unsafe], rhs[unsafe], moved[unsafe])
+            again = self._solve_in_full(z[unsafe], p[unsafe], rhs[unsafe], moved[unsafe])
             x[unsafe], negative[unsafe] = again.x, again.negative
         return BorderedSolution(x, negative, ratio, unsafe, np.full(len(z), np.nan))
 
@@ -330,7 +330,7 @@ class OutOfPlane:
         out[:, held, held] = 1.0
         return out
 
-    def _pivoted(
+    def _solve_in_full(
         self, z: Lanes, p: Parameters, rhs: Float[np.ndarray, "lanes sides lateral"], shift: Values
     ) -> BorderedSolution:
         """`solve` in full."""

@@ -227,11 +227,11 @@ class Rod(Described):
             Parameter("Theta", "rad", 1.0, "actuator"),
             Parameter("Delta", "rad", 1.0, "actuator", 0.0),
             Parameter("q", "4π²B/L²", 1.0, "load", 0.0),
-            Parameter("nu", "L", 1.0, "fixed", self._checked_span(span), 0.0, 1.0),
+            Parameter("nu", "L", 1.0, "fixed", self._check_span(span), 0.0, 1.0),
         )
 
     @staticmethod
-    def _checked_span(span: float) -> float:
+    def _check_span(span: float) -> float:
         value = float(span)
         if not 0.0 < value < 1.0:
             raise InputError(

@@ -198,7 +198,7 @@ class RodDescription(ABC):
         (raw, weight), *others = weights.items()
         role: Role = "load" if raw in self.loads else "actuator"
         if not others and weight and sum(raw in each for each in self.combined.values()) == 1:
-            return _renamed(self._parameter(raw), name, role, weight)
+            return _rename(self._parameter(raw), name, role, weight)
         quantity, units = quantities.pop(), self.units
         # between held ends a straight rod needs a turn to know its upright side
         needed = self.coordinates is None and name == "Theta" and "nu" in self.raw_names
@@ -268,7 +268,7 @@ class RodDescription(ABC):
         return data | self.units.data()
 
 
-def _renamed(raw: Parameter, name: str, role: Role, weight: float) -> Parameter:
+def _rename(raw: Parameter, name: str, role: Role, weight: float) -> Parameter:
     """The parameter of another name that `weight` times a raw one moves alone."""
     default = None if raw.default is None else raw.default / weight
     low, high = sorted((raw.lower / weight, raw.upper / weight))

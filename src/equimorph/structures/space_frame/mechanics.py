@@ -270,7 +270,7 @@ class SpatialFrameMechanics(SpatialFrameLagrangian, JointEquations):
         assert shift is None, "the parts contain it"
         entries, residual, lowered = parts
         at = self._coordinates(z, residual, lowered)
-        return partial(self._solved, at, entries)
+        return partial(self._solve_reduced, at, entries)
 
     # --- solves in rotations --------------------------------------------------------------------
 
@@ -299,7 +299,7 @@ class SpatialFrameMechanics(SpatialFrameLagrangian, JointEquations):
         flat = across.reshape(lanes, k, 3 * len(self.model.free))
         return along, np.concatenate([flat, rows[:, :, self._rows :]], axis=2)
 
-    def _solved(
+    def _solve_reduced(
         self,
         at: Coordinates,
         entries: Entries,

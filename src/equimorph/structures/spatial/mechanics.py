@@ -48,15 +48,15 @@ def step_tables(
     stiff = weights[..., None] * model.stiffness[:, places]
     whole = np.ones(len(mesh.nodes))
     whole[model.unknown_nodes] = lengths
-    forces, force_picks = _used(model.force[m:, :, places])
-    moments, moment_picks = _used(model.moment[m:, :, places] * weights[..., None])
-    torsion, torsion_picks = _used(model.torsion[m:, :, places] * weights)
+    forces, force_picks = _in_use(model.force[m:, :, places])
+    moments, moment_picks = _in_use(model.moment[m:, :, places] * weights[..., None])
+    torsion, torsion_picks = _in_use(model.torsion[m:, :, places] * weights)
     axes, closing, compliance = _closures(model)
     softness = model.softness[:, places] if model.soft else model.softness[:0]
     # the kernel weights the axes of the cross-section, and so the forces
     tables = (
         places, slopes[:, places][:, :, places], weights, stiff, moments, moment_picks, torsion,
-        torsion_picks, forces, force_picks, *_used(model.tension[m:, :, places]), softness,
+        torsion_picks, forces, force_picks, *_in_use(model.tension[m:, :, places]), softness,
         model.turned[:, :, m:].reshape(6, -1),
         np.array(model.held, dtype=np.int64), axes, closing, compliance, whole,
     )  # fmt: skip
@@ -81,9 +81,9 @@ def field_tables(model: SpatialModel) -> tuple[np.ndarray, ...]:
     slopes = mesh.reference.derivative / mesh.lengths[:, None, None]
     softness = model.softness if model.soft else model.softness[:0]
     tables = (
-        slopes, mesh.element_weights, model.stiffness, *_used(model.moment),
-        *_used(model.torsion), *_used(model.force), *_used(model.tension), softness, model.turned,
-        np.array(model.held, dtype=np.int64),
+        slopes, mesh.element_weights, model.stiffness, *_in_use(model.moment),
+        *_in_use(model.torsion), *_in_use(model.force), *_in_use(model.tension), softness,
+        model.turned, np.array(model.held, dtype=np.int64),
     )  # fmt: skip
     return tuple(np.ascontiguousarray(each) for each in tables)
 
@@ -95,7 +95,9 @@ def pairs_of(parts: int) -> tuple[Int[np.ndarray, "pairs 3"], Int[np.ndarray, "p
     return np.array(rows), np.array([(part, part, 0) for part in range(parts)])
 
 
-def _used(rows: Float[np.ndarray, "scalars ..."]) -> tuple[np.ndarray, Int[np.ndarray, " used"]]:
+def _in_use(
+    rows: Float[np.ndarray, "scalars ..."],
+) -> tuple[np.ndarray, Int[np.ndarray, " used"]]:
     """Rows with entries, and their numbers."""
     picks = np.flatnonzero(np.abs(rows).reshape(len(rows), -1).max(axis=1) > 0.0)
     return rows[picks], picks

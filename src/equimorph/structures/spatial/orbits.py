@@ -74,12 +74,12 @@ def pinned_natural_states(
     let = bent.copy()
     let[:, [name.startswith("theta") for name in names]] *= NEARLY / BEND
     z, found = natural_states(raw, bent)
-    z = _followed(raw, bent, let, z, found)
-    z = _followed(rod, start, p, np.insert(z, raw.size, 0.0, axis=1), found)
+    z = _follow(raw, bent, let, z, found)
+    z = _follow(rod, start, p, np.insert(z, raw.size, 0.0, axis=1), found)
     return z, found
 
 
-def _followed(
+def _follow(
     rod: SpatialMechanics,
     start: Float[np.ndarray, "lanes given"],
     stop: Float[np.ndarray, "lanes given"],

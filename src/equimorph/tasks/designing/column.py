@@ -167,10 +167,10 @@ class _Elements:
             share[:, e], share[:, e + 1] = 1.0 - t, t
             rows.append(block)
             shares.append(share)
-        basis = self._allowed(mean)
+        basis = self._allowed_slopes(mean)
         return np.concatenate(rows) @ basis, basis.T @ mass @ basis, np.concatenate(shares)
 
-    def _allowed(self, mean: Float[np.ndarray, " size"]) -> Float[np.ndarray, "size n"]:
+    def _allowed_slopes(self, mean: Float[np.ndarray, " size"]) -> Float[np.ndarray, "size n"]:
         """Slopes that vanish at clamps and, between two of them, in the mean."""
         unit = np.eye(len(mean))
         if self.supports == "clamped-free":
@@ -206,7 +206,7 @@ class _Elements:
             for _ in range(STEPS):
                 step, decrement = self._newton(state, share, unit)
                 steps += 1
-                state = self._shortened(state, step, share, unit, decrement)
+                state = self._shorten(state, step, share, unit, decrement)
                 if decrement < STILL * share:
                     break
         return state[:-1], steps
@@ -252,7 +252,7 @@ class _Elements:
                 break
         return step, decrement
 
-    def _shortened(
+    def _shorten(
         self, state: Vector, step: Vector, share: float, unit: float, decrement: float
     ) -> Vector:
         """State after the step, halved until the barrier function falls."""

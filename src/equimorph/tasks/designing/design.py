@@ -267,12 +267,12 @@ def design_front(
         return DesignFront((found[0][0],), np.full((1, 2), np.nan))
     other = replace(problem, objectives=(second,), within=(*tuple(within), _bound(first, LOOSE)))
     search = DesignSearch(other, rebuilds)
-    last = search.run(ended[0].x, _swapped(ended[0]))
+    last = search.run(ended[0].x, _swap(ended[0]))
     levels = [second.sign * each.answers[k].value for each, k in ((ended[0], -1), (last[0], 0))]
     for level in np.linspace(levels[0], levels[1], points)[1:-1].tolist():
         bounded = replace(problem, within=(*tuple(within), _bound(second, level)))
         found.append(_between(bounded, rebuilds, found[-1][1]))
-    found.append((report(search, last), _swapped(last[0])))
+    found.append((report(search, last), _swap(last[0])))
     values = [[judged.answers[0].value, judged.answers[-1].value] for _, judged in found]
     return DesignFront(tuple(each for each, _ in found), np.array(values))
 
@@ -290,7 +290,7 @@ def _bound(question: Asked, level: float) -> DesignBound:
     return DesignBound(question, lower=-level)
 
 
-def _swapped(judged: Judged) -> Judged:
+def _swap(judged: Judged) -> Judged:
     """The same design with the first and the last question exchanged."""
     first, *between, last = judged.answers
     return replace(judged, answers=(last, *between, first))

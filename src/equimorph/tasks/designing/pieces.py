@@ -160,12 +160,12 @@ def moved(value: Moved, old: Structure, new: Structure) -> Moved:
     """
     if old is new or old.signature == new.signature:
         return value
-    again: Moved = _made_again(value, old, new)
+    again: Moved = _make_again(value, old, new)
     return again
 
 
 @lru_cache(maxsize=2048)
-def _made_again(value: Any, old: Structure, new: Structure) -> Any:
+def _make_again(value: Any, old: Structure, new: Structure) -> Any:
     def swap(each: object) -> object:
         if isinstance(each, Structure):
             return new if each.signature == old.signature else each

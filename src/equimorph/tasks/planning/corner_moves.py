@@ -147,7 +147,7 @@ def _move_every_other(
         moves = replace(moves, lifts=cost.reshape(2, -1))
         gain = _gain(chain.lifts, moves.tried, good, cost)
     least = LEAST_GAIN * (chain.legs if chain.lifts is None else chain.lifts).sum()
-    return _taken(chain, moves, np.where(gain > least, gain, 0.0))
+    return _take_best(chain, moves, np.where(gain > least, gain, 0.0))
 
 
 def _interleave(first: Places, second: Places) -> Places:
@@ -194,7 +194,7 @@ def _gain(
     return np.where(both, old[tried - 1] + old[tried] - total, -np.inf)
 
 
-def _taken(chain: _Chain, moves: _Moves, gain: Float[np.ndarray, " n"]) -> _Chain:
+def _take_best(chain: _Chain, moves: _Moves, gain: Float[np.ndarray, " n"]) -> _Chain:
     """Chain with the best of the moves that gain something, one for each corner."""
     best = np.full(len(chain.corners.states), 0.0)
     np.maximum.at(best, moves.tried, gain)

@@ -98,7 +98,7 @@ class Filtration:
         none = np.full(len(passages.facets), np.inf)
         shut = cls(eset, objective, constraints, passages, none, np.zeros(passages.facets.shape))
         values = objective.sign * stable_values(eset, objective.descriptor)
-        return shut._opened(np.arange(len(none)), values[passages.facets], None)
+        return shut._open(np.arange(len(none)), values[passages.facets], None)
 
     def with_kinks(self, some: Items) -> "Filtration":
         """The same with some facets opened where branches of the objective cross on them."""
@@ -107,9 +107,9 @@ class Filtration:
         states = self.eset.points[vertices]
         known = self.objective.branches(states.z, states.p)
         place = place.reshape(facets.shape)
-        return self._opened(some, known[0].max(axis=1)[place], (known, place))
+        return self._open(some, known[0].max(axis=1)[place], (known, place))
 
-    def _opened(
+    def _open(
         self, some: Items, values: Shares, kinks: tuple[Branches, Facets] | None
     ) -> "Filtration":
         """Facets opened at the least values on their edges, if these are lower than before."""

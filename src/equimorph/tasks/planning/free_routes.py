@@ -100,7 +100,7 @@ def _path(
 ) -> States | None:
     """Cheapest path between the ordered ends over the network, and a pass; else the lowest way."""
     first, last = order_ends(ends)
-    over = None if passing is None else _linked_over(passing, demands)
+    over = None if passing is None else _link_over(passing, demands)
     for way in () if over is None else (over, over[::-1]):
         parts = (cheapest_path(eset, (first, way[0]), demands), way[1:-1],
                  cheapest_path(eset, (way[-1], last), demands))  # fmt: skip
@@ -112,7 +112,7 @@ def _path(
     return passing.way if order_ends(ends) is ends else passing.way[::-1]
 
 
-def _linked_over(passing: Passing, demands: Demands) -> States | None:
+def _link_over(passing: Passing, demands: Demands) -> States | None:
     """Of the states over a pass those around it that straight lifts join.
 
     Farther off, where the network is wide, they may lie close along a bound that bends.

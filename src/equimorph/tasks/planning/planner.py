@@ -103,7 +103,7 @@ def plan(  # noqa: PLR0913  # the knobs of the public face, most by keyword
     demands = Demands.of(eset.structure, wish, (*eset.constraints, *within), margin)
     ends = (start, goal)
     check_ends(eset, ends)
-    corners = None if via is None else _checked_corners(eset, start, goal, via)
+    corners = None if via is None else _check_corners(eset, start, goal, via)
     _check_price(snap_price, via, extreme)
     if survive is not None and snap_price is not None:
         raise InputError("`snap_price` must not be given with `survive`; got both.")
@@ -142,7 +142,7 @@ def _check_price(
         )
 
 
-def _checked_corners(
+def _check_corners(
     eset: EquilibriumSet,
     start: State,
     goal: State,

@@ -115,7 +115,7 @@ def plan_sampled(  # noqa: PLR0913  # the knobs of the public face, most by keyw
     options = options or SamplingOptions()
     demands = Demands.of(start.structure, objective, within, margin)
     course = _course(start, actuators, loads)
-    ends = _checked_ends(start, goal, course)
+    ends = _check_ends(start, goal, course)
     for name, state in ends.items():
         if not state.stable:
             return refusal(f"the {name} is unstable (index {state.index})")
@@ -129,7 +129,7 @@ def plan_sampled(  # noqa: PLR0913  # the knobs of the public face, most by keyw
             path = _path_over_slices((start, goal), actuators, tightened, within, options.slices)
         if path is None:
             return refusal(_meaning_of_no(course, demands, goal, options))
-        route = _straightened_route(course, path, demands, tightened, monitor)
+        route = _straighten_route(course, path, demands, tightened, monitor)
         if route.arrived:
             break
     return route
@@ -162,7 +162,7 @@ def _meaning_of_no(
     )
 
 
-def _straightened_route(
+def _straighten_route(
     course: LoadCourse,
     path: TreePath,
     demands: Demands,
@@ -194,7 +194,7 @@ def _course(start: State, actuators: Box, loads: Sequence[Mapping[str, float]]) 
     return LoadCourse(actuators, free, np.array(corners))
 
 
-def _checked_ends(start: State, goal: State | None, course: LoadCourse) -> dict[str, State]:
+def _check_ends(start: State, goal: State | None, course: LoadCourse) -> dict[str, State]:
     """Both ends, by name."""
     if goal is None and course.legs == 0:
         raise InputError("`goal` must be given, unless loads move; got none.")

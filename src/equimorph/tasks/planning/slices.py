@@ -64,7 +64,7 @@ class Slices:
         while bases and path is None:
             for names, base in ((names, base) for names in self._pairs() for base in bases):
                 if path is None and len(self.sets) < most and self._add(names, base):
-                    path = self._joined()
+                    path = self._join_pieces()
             bases = list(self._nearest()) if path is None and len(self.sets) < most else []
         return path
 
@@ -158,7 +158,7 @@ class Slices:
         stations = [self.stations[k] for k in self.regions[region][:1]]
         return join_states(self.structure, [inner[self.demands.admissible(inner)], *stations])
 
-    def _joined(self) -> States | None:
+    def _join_pieces(self) -> States | None:
         """Path from start to goal over stations, whose pieces are found one by one."""
         while True:
             pairs = self._links()

@@ -154,7 +154,7 @@ class ErringStructure:
             share = float(self.errors.sizes[name])
             if not share < 1.0:
                 raise InputError(f"`{name}` must have an error below 1, a share; got {share!r}.")
-            if _scaled(self._identity, name, 1.0)[1] == 0:
+            if _scale(self._identity, name, 1.0)[1] == 0:
                 raise InputError(
                     f"`survive` must name parameters ({', '.join(names)}) or numbers that the "
                     f"{self.structure.kind} was made from; got {name!r}."
@@ -199,7 +199,7 @@ class ErringStructure:
         """
         identity = self._identity
         for name, share in zip(self.data, shares, strict=True):
-            identity = _scaled(identity, name, 1.0 + share)[0]
+            identity = _scale(identity, name, 1.0 + share)[0]
         return from_identity(identity) if any(shares) else self.structure
 
     def carry(self, start: State, shares: Sequence[float]) -> State | None:
@@ -287,18 +287,18 @@ def _multiple(change: Lanes, g: Lanes) -> float:
     return multiple if good else np.nan
 
 
-def _scaled(data: Any, name: str, factor: float) -> tuple[Any, int]:
+def _scale(data: Any, name: str, factor: float) -> tuple[Any, int]:
     """Plain data with all numbers of a name multiplied, and how many there are."""
     if isinstance(data, Mapping):
         pairs = [
             (_times(value, factor), 1) if key == name and _is_quantity(value)
-            else _scaled(value, name, factor)
+            else _scale(value, name, factor)
             for key, value in data.items()
         ]  # fmt: skip
         found = dict(zip(data, (value for value, _ in pairs), strict=True))
         return found, sum(count for _, count in pairs)
     if isinstance(data, list | tuple):
-        pairs = [_scaled(value, name, factor) for value in data]
+        pairs = [_scale(value, name, factor) for value in data]
         return [value for value, _ in pairs], sum(count for _, count in pairs)
     return data, 0
 
