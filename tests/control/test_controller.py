@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import equimorph as em
-from equimorph.control.estimate import Measurement, fitted
+from equimorph.control.estimate import Measurement, fit_loads
 from equimorph.control.likely import positions
 from oracles.wandering_load import Plant, PlantInMuJoCo, wandering
 from sets import arch_set
@@ -71,7 +71,7 @@ def test_estimates_come_as_close_to_a_fold_as_the_best_fit_is(begun):
     for seen in (-1.1, end - 0.01, end + 0.01, end + 0.03):
         measured = Measurement.of({angle: seen}, {angle: NOISE})
         best = (((places - seen) / NOISE) ** 2 + prior).min()
-        found = fitted(start, at, np.array([[deviation**2]]), measured)
+        found = fit_loads(start, at, np.array([[deviation**2]]), measured)
         assert found.state.index == 0
         assert found.misfit == pytest.approx(best, rel=1e-2, abs=0.05)
 

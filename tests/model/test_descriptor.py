@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from equimorph.errors import InputError, suggestion
-from equimorph.model import Descriptor, eased
+from equimorph.model import Descriptor, ease
 from equimorph.structures import Rod, Spring, from_identity
 from typecheck import unchecked
 
@@ -81,14 +81,14 @@ def test_a_constraint_holds_on_its_bound_and_by_its_ease_beyond():
     force = Descriptor("force", "1", lambda z, p: p[:, 1] + 2.0)
     for constraint in (force <= 2.0, force >= 2.0):
         assert constraint.holds(states).all()
-        assert eased(constraint).excess(states.z, states.p) == pytest.approx(-2e-9, rel=1e-6)
+        assert ease(constraint).excess(states.z, states.p) == pytest.approx(-2e-9, rel=1e-6)
     assert not (force <= 1.9).holds(states).any()
     assert not (force >= 2.1).holds(states).any()
 
 
 def test_the_ease_of_a_constraint_is_relative_to_bounds_above_one():
     force = Spring().height
-    assert [eased(force <= bound).ease for bound in (-50.0, 0.0, 0.5, 3.0)] == [
+    assert [ease(force <= bound).ease for bound in (-50.0, 0.0, 0.5, 3.0)] == [
         pytest.approx(each) for each in (5e-8, 1e-9, 1e-9, 3e-9)
     ]
 

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.polynomial import legendre
 
-from equimorph.structures.spatial.quaternions import RIGHT, bilinear, matrices, normalised
+from equimorph.structures.spatial.quaternions import RIGHT, bilinear, matrices, normalise
 
 STATIONS = 400
 
@@ -11,7 +11,7 @@ STATIONS = 400
 def equations(mechanics, z, p, *directions):
     """F with its derivatives along none, one or two directions."""
     given, y = mechanics.jets(z, p, *directions)
-    unit, inverse, square = normalised(given)
+    unit, inverse, square = normalise(given)
     slope = mechanics.slope(unit, y)
     along = bilinear(lambda a, b: (a * b).sum(axis=-1), unit, slope)
     across = slope - bilinear(lambda a, b: a[..., None] * b, along, unit)

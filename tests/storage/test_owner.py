@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from equimorph.model import Descriptor, eased
+from equimorph.model import Descriptor, ease
 from equimorph.storage.owner import Owner, words_of
 from equimorph.structures import Spring
 
@@ -14,7 +14,7 @@ MINE = Descriptor("mine", "1", lambda z, p: z[:, 0])
 
 @pytest.mark.parametrize(
     "constraint",
-    [SPRING.height <= 0.5, eased(SPRING.height >= -30.0), eased(MINE <= 0.0)],
+    [SPRING.height <= 0.5, ease(SPRING.height >= -30.0), ease(MINE <= 0.0)],
     ids=str,
 )
 def test_a_constraint_comes_back_with_its_ease(constraint):

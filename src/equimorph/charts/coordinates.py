@@ -132,7 +132,7 @@ class Coordinates(Scalars):
             )
         return np.stack(columns, axis=2)
 
-    def solved(
+    def solve_states(
         self, z: Lanes, p: Parameters, wanted: Values, planes: Callable[[Some], Rows], folded: Flags
     ) -> tuple[Lanes, Parameters, Flags, Numbers]:
         """States with given coordinates near guesses, whether they were found, and their index.

@@ -211,7 +211,7 @@ class Cells:
     ) -> tuple[Lanes, Parameters, Flags]:
         """Exact states near guesses, where there are any that the cells may have."""
         folded = self._at_fold[hits.cell]
-        z, p, good, index = self.coordinates.solved(
+        z, p, good, index = self.coordinates.solve_states(
             guess_z, guess_p, wanted, lambda lanes: self.planes(hits.cell[lanes]), folded
         )
         setting = self.coordinates.setting

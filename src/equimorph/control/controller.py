@@ -7,8 +7,8 @@ import numpy as np
 
 from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Flags, Values
-from equimorph.control.estimate import Belief, ControlStatus, Estimate, Measurement, fitted
-from equimorph.control.likely import Bundles, LikelyLoads, moved, positions
+from equimorph.control.estimate import Belief, ControlStatus, Estimate, Measurement, fit_loads
+from equimorph.control.likely import Bundles, LikelyLoads, move_states, positions
 from equimorph.control.safe_routes import route_is_safe, safe_route
 from equimorph.control.strides import MovingTarget, Step, Strides, ahead_of, setting_of
 from equimorph.errors import InputError
@@ -265,7 +265,7 @@ class Controller:
         )  # fmt: skip
 
     def _fit(self, state: State, prior: np.ndarray, measured: Measurement) -> Estimate:
-        return fitted(state, self._loads, prior, measured)
+        return fit_loads(state, self._loads, prior, measured)
 
     def _sheets(self, belief: Belief) -> list[State]:
         """The state, and the others at the command under the loads that were estimated last."""
@@ -273,7 +273,7 @@ class Controller:
         if len(over) == 0:
             return [belief.state]
         loads = belief.state.p[self._loads][None].repeat(len(over), 0)
-        states, arrived = moved(over, self._loads, loads)
+        states, arrived = move_states(over, self._loads, loads)
         return [belief.state, *states[np.flatnonzero(arrived)]]
 
     def _likely(self, belief: Belief) -> LikelyLoads:
@@ -299,7 +299,7 @@ class Controller:
         """Which states are the goal under their loads."""
         loads = states.p[:, self._loads]
         z, p = (each[None].repeat(len(states), 0) for each in (self._goal.z, self._goal.p))
-        there, arrived = moved(States(self.structure, z, p), self._loads, loads)
+        there, arrived = move_states(States(self.structure, z, p), self._loads, loads)
         gap = (there.z - states.z)[:, : self.structure.unknowns]
         return np.asarray(arrived & (gap**2 @ self.structure.mass < SAME_STATE**2))
 

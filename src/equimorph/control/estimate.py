@@ -13,7 +13,7 @@ import numpy as np
 from scipy.special import chdtrc
 
 from equimorph.arrays import Float, Values
-from equimorph.control.likely import Places, moved
+from equimorph.control.likely import Places, move_states
 from equimorph.equilibria import Guards, settle
 from equimorph.errors import InputError
 from equimorph.model import Descriptor
@@ -152,7 +152,7 @@ class Estimate:
     chance: float
 
 
-def fitted(prior: State, at: Places, covariance: Covariance, measured: Measurement) -> Estimate:
+def fit_loads(prior: State, at: Places, covariance: Covariance, measured: Measurement) -> Estimate:
     """Estimate from a measurement and normally distributed loads about those of `prior`.
 
     Gauss–Newton whose steps are shortened until they lead to a better stable state on the sheet: a
@@ -199,5 +199,5 @@ def _after(here: States, at: Places, along: Linearisation, change: Loads) -> Ite
     settled = settle(here.structure, z, p, guards=Guards(index=stable, trust=near))
     yield States(here.structure, settled.z, settled.p)[np.flatnonzero(settled.found)]
     loads = (here.p + SHARES[:, None] * (p - here.p))[:, at]
-    states, arrived = moved(here[np.zeros(len(SHARES), int)], at, loads)
+    states, arrived = move_states(here[np.zeros(len(SHARES), int)], at, loads)
     yield states[np.flatnonzero(arrived)]

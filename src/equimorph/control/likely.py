@@ -106,7 +106,7 @@ class LikelyLoads:
         to[:, self.at] = np.tile(self.values, (len(states), 1))
         return self._bundles(source, to)
 
-    def linked(self, source: Bundles, target: Bundles) -> Flags:
+    def can_move(self, source: Bundles, target: Bundles) -> Flags:
         """Whether straight moves lead from places to places safely under each of the loads.
 
         After a jump the structure may come elsewhere, as long as it does not snap; it may happen
@@ -134,7 +134,7 @@ class LikelyLoads:
         share = number / (between[move] + 1)
         moving = np.flatnonzero((change != 0.0).any(axis=0))
         to = (source.p[move] + share[:, None] * change[move])[:, moving]
-        states, good = moved(source[move], moving, to)
+        states, good = move_states(source[move], moving, to)
         jumps = replace(self, values=self.values[self.usual :])
         good[good] = jumps.under(states[np.flatnonzero(good)]).safe
         bears[move[~good]] = False
@@ -148,7 +148,7 @@ class LikelyLoads:
         return Bundles(states, np.asarray(there.reshape(-1, count).all(axis=1)), count)
 
 
-def moved(states: States, at: Places, to: Float[np.ndarray, "n k"]) -> tuple[States, Flags]:
+def move_states(states: States, at: Places, to: Float[np.ndarray, "n k"]) -> tuple[States, Flags]:
     """Stable states after straight changes of some parameters, and which of them arrived."""
     p = states.p.copy()
     p[:, at] = to

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from equimorph.arrays import Int, Values
-from equimorph.control.likely import REACH, Bundles, LikelyLoads, moved, positions
+from equimorph.control.likely import REACH, Bundles, LikelyLoads, move_states, positions
 from equimorph.equilibria import TraceOptions
 from equimorph.manifold import EquilibriumSet, equilibrium_set
 from equimorph.manifold.complex.kept_sets import from_cache
@@ -64,7 +64,7 @@ def route_is_safe(
             return False
         ahead = join_states(here.structure, [way.states[way.corners[1:]], goal])
     path, legs = start.follow(likely.under(ahead)), np.arange(len(ahead))
-    return bool(likely.linked(path.take(legs), path.take(legs + 1)).all())
+    return bool(likely.can_move(path.take(legs), path.take(legs + 1)).all())
 
 
 def _loads_of(eset: EquilibriumSet, likely: LikelyLoads) -> Values:
@@ -102,7 +102,7 @@ def _over(
     the likely loads; links are lifted under all of these only where a path uses them.
     """
     places = from_cache(eset, ("places", width), lambda: _Places.within(eset, width))
-    here, arrived = moved(
+    here, arrived = move_states(
         eset.points[places.vertices], likely.at, likely.values[:1].repeat(len(places.vertices), 0)
     )
     nodes = likely.under(here[np.flatnonzero(arrived)])
@@ -123,7 +123,7 @@ def _over(
 def _straighten(path: Bundles, likely: LikelyLoads) -> States:
     """Corners of the chain of safe straight moves between places of a path with most clearance."""
     first, second = pairs_on_path(len(path), STATIONS_WITH_MARGINS)
-    good = likely.linked(path.take(first), path.take(second))
+    good = likely.can_move(path.take(first), path.take(second))
     first, second, estimated = first[good], second[good], path.estimated
     clear = replace(likely.demands, objective=objective_of("clearance", estimated.structure))
     _, costs = connect(estimated[first], estimated[second], clear)
@@ -187,7 +187,7 @@ def _cheapest(nodes: Bundles, pairs: Pairs, likely: LikelyLoads) -> Int[np.ndarr
             return None
         used = np.flatnonzero(on_paths(pairs, [path]))
         fresh = used[~lifted[used]]
-        good = likely.linked(*(nodes.take(side) for side in pairs[fresh].T))
+        good = likely.can_move(*(nodes.take(side) for side in pairs[fresh].T))
         lifted[fresh] = True
         if good.all():
             return path

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from equimorph.arrays import Float, Values
-from equimorph.control.likely import Bundles, LikelyLoads, Places, moved
+from equimorph.control.likely import Bundles, LikelyLoads, Places, move_states
 from equimorph.model import Box, Descriptor
 from equimorph.structures import State, States, join_states
 from equimorph.tasks.motion.course import correct_onto_targets
@@ -115,7 +115,7 @@ class Strides:
         for share in SHARES:
             whole = share == 1.0
             ahead = first.after if whole else likely.under(self._after(state, there, share))
-            if len(ahead) and likely.linked(place, ahead)[0]:
+            if len(ahead) and likely.can_move(place, ahead)[0]:
                 return Stride(ahead.estimated[0], share * self._part(state, there) == 1.0)
         return Stride(None)
 
@@ -123,7 +123,7 @@ class Strides:
         """The state after a part of a stride towards a place, where it is stable; or none."""
         here, part = state.p[self.actuators], share * self._part(state, there)
         target = there if part == 1.0 else here + part * (there - here)
-        states, arrived = moved(state.batch, self.actuators, target[None])
+        states, arrived = move_states(state.batch, self.actuators, target[None])
         return states[np.flatnonzero(arrived)]
 
     def _part(self, state: State, there: Values) -> float:
@@ -137,7 +137,7 @@ class Strides:
         steps = self.longest * np.concatenate([np.diag(scales), -np.diag(scales)])
         places = np.array([row for row in here + steps if self.box.holds(row, slack=0.0)])
         sources = state.batch[np.zeros(len(places), int)]
-        states, arrived = moved(sources, self.actuators, places.reshape(-1, len(here)))
+        states, arrived = move_states(sources, self.actuators, places.reshape(-1, len(here)))
         bearable = replace(likely, demands=replace(likely.demands, margin=0.0))
         borne = bearable.under(states[np.flatnonzero(arrived)])
         if not borne.safe.any():

@@ -48,7 +48,7 @@ class Balance:
         """Places of the joints between links."""
         return self.linkage.places(self.v)
 
-    def reduced(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def reduce(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Stiffness and mass on the null space of the constraints, and its basis."""
         linkage, size = self.linkage, self.linkage.size
         whole = linkage.jacobian(self.v, self.multipliers, self.y)
@@ -62,7 +62,7 @@ class Balance:
 
     def modes(self) -> tuple[Float[np.ndarray, " modes"], Float[np.ndarray, "entries modes"]]:
         """Squares of angular frequencies, ascending, and modes of unit mass."""
-        stiff, mass, basis = self.reduced()
+        stiff, mass, basis = self.reduce()
         values, vectors = eigh(stiff, mass)
         return values, basis @ vectors
 
@@ -85,7 +85,7 @@ class Balance:
     @property
     def least(self) -> float:
         """Square of the lowest angular frequency; negative where the equilibrium is unstable."""
-        stiff, mass, _ = self.reduced()
+        stiff, mass, _ = self.reduce()
         return float(eigh(stiff, mass, eigvals_only=True, subset_by_index=(0, 0))[0])
 
 

@@ -5,7 +5,7 @@ from equimorph.model.descriptor import (
     Descriptor as Descriptor,
     Vanishing as Vanishing,
     are_feasible as are_feasible,
-    eased as eased,
+    ease as ease,
     function_of as function_of,
     largest_of as largest_of,
     worst_excess as worst_excess,
@@ -31,7 +31,7 @@ from equimorph.model.journal import (
     content_of_function as content_of_function,
     cut_rows as cut_rows,
     map_rows as map_rows,
-    recalled as recalled,
+    recall_or_compute as recall_or_compute,
 )
 from equimorph.model.obstacle import Disc as Disc, HalfPlane as HalfPlane, Obstacle as Obstacle
 from equimorph.model.parameter import (

@@ -336,6 +336,6 @@ def largest_of(name: str, *descriptors: Descriptor) -> Descriptor:
 
 
 @check_arguments
-def eased(constraint: Constraint) -> Constraint:
+def ease(constraint: Constraint) -> Constraint:
     """Constraint that rounding does not violate: optima lie on bounds."""
     return replace(constraint, ease=EASE * constraint.size)

@@ -128,7 +128,7 @@ class Journal(Protocol):
         """Keep the findings of a step that was not recalled."""
 
 
-def recalled(journal: Journal, step: str, compute: Callable[[], Findings]) -> Findings:
+def recall_or_compute(journal: Journal, step: str, compute: Callable[[], Findings]) -> Findings:
     """Findings of a step: from the journal, else computed and kept there."""
     found = journal.recall(step)
     if found is None:

@@ -24,7 +24,7 @@ from equimorph.plotting import style
 from equimorph.plotting.depth import DepthBuffer, View, Viewpoint, depth_buffer, view_of
 from equimorph.plotting.shading import Paint, paint
 from equimorph.structures import States
-from equimorph.structures.solids import Mesh, joined, solids
+from equimorph.structures.solids import Mesh, join_meshes, solids
 
 SAMPLES = 3
 """Pixels of the depth buffer per pixel of the picture, in each direction."""
@@ -204,7 +204,7 @@ class Picture:
         linear = self.viewpoint.frame * np.array([scale, scale, -scale])
         view = View(linear, np.array([-left * scale, -low * scale, 0.0]), self.fineness / 72)
         fine = view.translate(np.zeros(2), SAMPLES)
-        whole = joined(meshes)
+        whole = join_meshes(meshes)
         tints = np.repeat(np.array(colours), [len(each.white) for each in meshes], axis=0)
         tints = tints + whole.white[:, None] * (1.0 - tints)
         surface = Paint(whole.normals, np.ones(3), tints, (), style.rgba(style.INK)[:3])

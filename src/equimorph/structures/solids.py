@@ -148,12 +148,12 @@ def solids(states: States, size: float) -> list[Mesh]:
     frames = structure.frames(states.z, states.p)
     if frames is None:
         section = profile(_BAR * RADIUS * size, 1.0)
-        return [joined(bars(corners, section)) for corners in shapes]
+        return [join_meshes(bars(corners, section)) for corners in shapes]
     section = profile(RADIUS * size, structure.flatness)
     return [tube(*each, section) for each in zip(shapes, frames, strict=True)]
 
 
-def joined(meshes: Sequence[Mesh]) -> Mesh:
+def join_meshes(meshes: Sequence[Mesh]) -> Mesh:
     """All triangles in one mesh."""
     parts = [(each.corners, each.normals, each.white) for each in meshes]
     return Mesh(*(np.concatenate(column) for column in zip(*parts, strict=True)))

@@ -86,14 +86,14 @@ def _larger(file: Path) -> str:
     return other.name if other.suffix == ".svg" or other.exists() else ""
 
 
-def found_line(words: str) -> str:
+def answer_line(words: str) -> str:
     """Return the paragraph of an answer; what stands between two pairs of stars is bold."""
     text = BOLD.sub(lambda bold: f"<strong>{bold[1].capitalize()}</strong>", escape(words), count=1)
     kind = ' class="verdict"' if text.startswith("<strong>") else ""
     return f"<p{kind}>{text}</p>"
 
 
-def embedded(file: str, caption: str) -> str:
+def embed(file: str, caption: str) -> str:
     """Return a frame with another page of the folder, and a link to it."""
     words = escape(caption)
     return (

@@ -359,7 +359,7 @@ class Kind(ABC, Generic[A]):
         why = self.refusal(question, answer)
         return [
             f"<h2>{escape(question.title)}</h2>",
-            html.refusal_line(why) if why else html.found_line(self.words(question, answer)),
+            html.refusal_line(why) if why else html.answer_line(self.words(question, answer)),
             *map(html.schedule_links, map(schedule_table, self.schedules(question, answer))),
             *pictures(folder, self.figures(question, answer)),
             *self.details(question, answer),

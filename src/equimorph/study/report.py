@@ -139,7 +139,7 @@ def report(outcome: Outcome, folder: Path, text: str, title: str) -> str:
     """
     body = [f"<h1>{escape(title)}</h1>", _question(outcome.problem)]
     if (folder / EXPLORER).exists():
-        body.append(html.embedded(EXPLORER, ON_THE_SET))
+        body.append(html.embed(EXPLORER, ON_THE_SET))
     for each in outcome.answers:
         body += each.question.kind.report(each.question, each.answer, folder)
     for point, states in zip(outcome.problem.points, outcome.points, strict=True):

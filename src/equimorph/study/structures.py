@@ -225,7 +225,7 @@ def many(form: Any, least: int = 1, most: int | None = None) -> Any:
     return Annotated[list[form], Field(min_length=least, max_length=most)]
 
 
-def named(form: Any, least: int = 0) -> Any:
+def by_name(form: Any, least: int = 0) -> Any:
     """Values by name."""
     return Annotated[dict[str, form], Field(min_length=least)] if least else dict[str, form]
 
@@ -311,8 +311,8 @@ RESOLUTION = {
 ROD = {
     "load": LoadShape,
     **dict.fromkeys(("stiffness", "curvature", "axial", "torsion", "lateral"), Profile),
-    **dict.fromkeys(("loads", "actuators"), named(Term)),
-    "coordinates": named(named(Number)),
+    **dict.fromkeys(("loads", "actuators"), by_name(Term)),
+    "coordinates": by_name(by_name(Number)),
     **dict.fromkeys(("rise", "EI", "length"), Quantity),
     **{"section": CrossSection, "mass": Stiffness, **RESOLUTION},
     "elements": Annotated[int, Field(ge=2, le=1000)],
@@ -333,26 +333,26 @@ FORMS: Mapping[str, Forms] = {
             "parameters": many(ParameterSection, 0),
         },
         **{"constraints": list[Formula], "draw": many(many(Formula, 2, 2), 0)},
-        **dict.fromkeys(("definitions", "descriptors"), named(Formula)),
+        **dict.fromkeys(("definitions", "descriptors"), by_name(Formula)),
         "mass": list[Formula | list[Formula]],
         **{"supports": list[DrawnSupportSection], "forces": list[DrawnForceSection]},
         "coercive": bool,
     },
     "truss": {
-        **{"joints": named(many(Quantity, 2, 3), 2), "bars": many(BarSection)},
-        **{"supports": named(str), "loads": named(named(Vector))},
-        **{"actuators": named(named(Number)), "masses": named(Stiffness), "units": UnitSystem},
-        "strain": Literal["engineering", "green"],
+        **{"joints": by_name(many(Quantity, 2, 3), 2), "bars": many(BarSection)},
+        **{"supports": by_name(str), "loads": by_name(by_name(Vector))},
+        **{"actuators": by_name(by_name(Number)), "masses": by_name(Stiffness)},
+        **{"units": UnitSystem, "strain": Literal["engineering", "green"]},
     },
     "frame": {
-        **{"joints": named(many(Quantity, 2, 2), 2), "members": many(MemberSection)},
-        **{"supports": named(Support), "loads": named(named(Vector))},
-        **{"actuators": named(EffectSection), **RESOLUTION},
+        **{"joints": by_name(many(Quantity, 2, 2), 2), "members": many(MemberSection)},
+        **{"supports": by_name(Support), "loads": by_name(by_name(Vector))},
+        **{"actuators": by_name(EffectSection), **RESOLUTION},
     },
     "spatial frame": {
-        **{"joints": named(many(Quantity, 3, 3), 2), "members": many(SpatialMemberSection)},
-        **{"supports": named(SupportInSpace), "loads": named(named(InSpace))},
-        **{"actuators": named(SpatialEffectSection), **RESOLUTION},
+        **{"joints": by_name(many(Quantity, 3, 3), 2), "members": many(SpatialMemberSection)},
+        **{"supports": by_name(SupportInSpace), "loads": by_name(by_name(InSpace))},
+        **{"actuators": by_name(SpatialEffectSection), **RESOLUTION},
     },
 }
 """Forms of the arguments of each kind of structure."""

@@ -35,7 +35,7 @@ from equimorph.model import (
     Findings,
     Journal,
     content_of_descriptor,
-    recalled,
+    recall_or_compute,
 )
 from equimorph.structures import States, Structure
 
@@ -153,7 +153,7 @@ def recall_set(
         If the journal is that of another question.
     """
     journal.begin(question)
-    entry = recalled(journal, "set", lambda: _entry(compute()))
+    entry = recall_or_compute(journal, "set", lambda: _entry(compute()))
     return _set(entry, setting, box, fixed)
 
 

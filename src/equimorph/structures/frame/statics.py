@@ -133,12 +133,6 @@ class SpaceFlows(NamedTuple):
     members: Float[np.ndarray, "flows members 3"]
     supports: Float[np.ndarray, "flows joints 3"]
 
-    def combined(self, by: Float[np.ndarray, "others flows"]) -> "SpaceFlows":
-        """Linear combinations."""
-        return SpaceFlows(
-            np.einsum("of,fmk->omk", by, self.members), np.einsum("of,fjk->ojk", by, self.supports)
-        )
-
 
 @dataclass(frozen=True, eq=False)
 class SpaceStatics:

@@ -17,7 +17,7 @@ from equimorph.structures.space_frame.network import SpatialNetwork, Turning
 from equimorph.structures.spatial.quaternions import (
     RIGHT,
     exponential,
-    gathered,
+    gather,
     matrices,
     rotation_vectors,
 )
@@ -71,13 +71,13 @@ class SpatialFrameFields(SpatialFrameMechanics, AnyFrame):
     def _drawn_chords(self) -> Float[np.ndarray, "pieces 3"]:
         """Vectors from start to end of the pieces as drawn, by the quadrature of the model."""
         pull = (self.model.weights[..., None] * self.model.tangents).sum(axis=1)
-        return gathered(pull, self.model.owner, self.model.pieces)
+        return gather(pull, self.model.owner, self.model.pieces)
 
     def displacements(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes joints 3"]:
         """Moves of the joints: what a load of size 1 on each would travel."""
         model = self.model
         _, w, _, y = self.jets(z, p)
-        chords = gathered(self.chords(w, y)[0].sum(axis=2), model.owner, model.pieces)
+        chords = gather(self.chords(w, y)[0].sum(axis=2), model.owner, model.pieces)
         flow, supports = self._unit_loads
         moves = np.einsum("fka,lka->lf", flow, chords - self._drawn_chords)
         given = np.einsum("ls,sja->lja", y[0], model.moved)
@@ -92,7 +92,7 @@ class SpatialFrameFields(SpatialFrameMechanics, AnyFrame):
     def shortenings(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes points"]:
         """Elastic shortenings of the axis at the points of every piece."""
         _, w, _, y = self.jets(z, p)
-        own = 1.0 + self.actuated(y)[1][0][:, self.model.owner, None]
+        own = 1.0 + self.actuated_strains(y)[1][0][:, self.model.owner, None]
         shorter = 1.0 - self.tensions(w, y)[2][0] / own
         return np.asarray(shorter.reshape(len(z), self.model.nodes.size))
 
@@ -175,7 +175,7 @@ class SpatialFrameFields(SpatialFrameMechanics, AnyFrame):
         """Twist and curvatures about n and b at the points, per length as drawn."""
         model = self.model
         elastic = self.elastic_strains(z, p)
-        free = self.actuated(self.jets(z, p)[3])[0][0][:, model.owner]
+        free = self.actuated_strains(self.jets(z, p)[3])[0][0][:, model.owner]
         bends = np.array([float(each.curvature) for each in model.network.members]) * model.length
         drawn = bends[model.network.owner][model.owner][:, None] * np.array([0.0, 0.0, 1.0])
         return np.asarray(elastic + (free + drawn)[:, :, None])

@@ -18,8 +18,8 @@ from equimorph.structures.spatial.quaternions import (
     conjugate,
     dot,
     element_slopes,
-    gathered,
-    normalised,
+    gather,
+    normalise,
     product,
     strains,
     turn_about,
@@ -83,7 +83,7 @@ class SpatialFrameLagrangian:
             y[k, :, :-1] = np.concatenate([dz[:, self.unknowns :], dp], axis=1)
             q[k], angles[k] = self.quaternions(dz), dz[:, self._rows : self.unknowns]
         w = np.zeros((parts, len(z), len(model.turning), 4), y.dtype)
-        w[:, :, model.free] = normalised(q)[0]
+        w[:, :, model.free] = normalise(q)[0]
         w[:, :, model.held] = self.held_turns(y)
         turned = turn_about(angles, model.hinge_axes)
         w[:, :, model.hinged] = bilinear(product, w[:, :, model.parents], turned)
@@ -99,7 +99,7 @@ class SpatialFrameLagrangian:
         """w e_k and w' at the points, and the strains v on fixed axes."""
         return strains(self._slopes, w[:, :, self.model.nodes])
 
-    def actuated(self, y: Jet) -> tuple[Jet, Jet]:
+    def actuated_strains(self, y: Jet) -> tuple[Jet, Jet]:
         """Strains of the cross-sections, and elongations, that are free of stress, by piece."""
         own = y[..., self.model.multipliers :]
         strain = np.einsum("plc,kca->plka", own, self.model.strains)
@@ -119,7 +119,7 @@ class SpatialFrameLagrangian:
 
     def point_moments(self, v: Jet, y: Jet) -> Jet:
         """Moments on fixed axes at the points, turned back with the cross-sections."""
-        strain = self.actuated(y)[0][:, :, self.model.owner]
+        strain = self.actuated_strains(y)[0][:, :, self.model.owner]
         free = np.einsum("eiak,plek->pleia", self.model.moment_of_strain, strain)
         return np.asarray(np.einsum("eiab,pleib->pleia", self.model.stiff, v) - free)
 
@@ -136,7 +136,7 @@ class SpatialFrameLagrangian:
         slope = 2.0 * bilinear(by_force, force, local)
         tension = 0.5 * bilinear(dot, slope, local)
         stretch = model.compliance[model.owner][:, None] * tension
-        stretch = stretch + self.actuated(y)[1][:, :, model.owner, None]
+        stretch = stretch + self.actuated_strains(y)[1][:, :, model.owner, None]
         stretch[0] += 1.0
         return slope, tension, stretch
 
@@ -152,7 +152,7 @@ class SpatialFrameLagrangian:
         """Gradient of L by unit quaternions at all nodes."""
         local = self.element_slopes(w, y)
         flat = local.reshape(*local.shape[:2], self.model.nodes.size, 4)
-        return gathered(flat, self.model.nodes.ravel(), len(self.model.turning))
+        return gather(flat, self.model.nodes.ravel(), len(self.model.turning))
 
     def chords(self, w: Jet, y: Jet) -> Float[np.ndarray, "parts lanes elements order 3"]:
         """Vectors along the member at the points: stretch times tangent times weight."""
@@ -169,13 +169,13 @@ class SpatialFrameLagrangian:
         """∂L/∂y at fixed rotations."""
         model, m = self.model, self.constraints
         chords, acting = self.chords(w, y), model.acting
-        first = gathered(chords.sum(axis=3), model.owner, model.pieces)
+        first = gather(chords.sum(axis=3), model.owner, model.pieces)
         moments = (chords * model.arclengths[..., None]).sum(axis=3)
-        second = gathered(moments, model.owner, model.pieces)
+        second = gather(moments, model.owner, model.pieces)
         work = np.einsum("plka,kra->plkr", first, acting.start)
         work = work - np.einsum("plka,kra->plkr", second, acting.drop)
         some = np.arange(acting.numbers.shape[1]) < acting.counts[:, None]
-        of_scalars = gathered(work[:, :, some][..., None], acting.numbers[some], model.scalars)
+        of_scalars = gather(work[:, :, some][..., None], acting.numbers[some], model.scalars)
         out = np.einsum("pls,st->plt", y, model.quadratic) - of_scalars[..., 0]
         _, _, v = self.strains(w)
         weighted = np.einsum(
@@ -219,7 +219,7 @@ class SpatialFrameLagrangian:
         """`equations` of one block of lanes."""
         model = self.model
         q, w, angles, y = self.jets(z, p, *directions)
-        unit, inverse, square = normalised(q)
+        unit, inverse, square = normalise(q)
         slope = self.slope(w, y)
         by_angle = self.lean_on_parents(slope, w, angles)
         own = slope[:, :, model.free]
@@ -244,7 +244,7 @@ class SpatialFrameLagrangian:
         )
         by_angle = 0.5 * bilinear(dot, here, rate)
         leaning = bilinear(product, here, conjugate(turned))
-        slope += gathered(leaning, model.parents, len(model.turning))
+        slope += gather(leaning, model.parents, len(model.turning))
         return by_angle
 
     def second_derivative(self, z: Lanes, p: Parameters, v: Direction, w: Direction) -> Lanes:

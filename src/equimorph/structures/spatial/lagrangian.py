@@ -26,8 +26,8 @@ from equimorph.structures.spatial.quaternions import (
     combine,
     element_slopes,
     exponential,
-    gathered,
-    normalised,
+    gather,
+    normalise,
     product,
     strains,
 )
@@ -142,7 +142,7 @@ class SpatialLagrangian(RodMechanics):
         local = local + bilinear(combine, stretch, pull)
         nodes = self.mesh.element_nodes
         flat = local.reshape(*local.shape[:2], nodes.size, 4)
-        return gathered(flat, nodes.ravel(), len(self.mesh.nodes))
+        return gather(flat, nodes.ravel(), len(self.mesh.nodes))
 
     def by_scalars(self, q: Jet, y: Jet) -> Jet:
         """∂L/∂y at fixed rotations."""
@@ -172,7 +172,7 @@ class SpatialLagrangian(RodMechanics):
         """L without the multipliers' part."""
         given, y = self.jets(z, p)
         m = self.constraints
-        q, _, square = normalised(given)
+        q, _, square = normalise(given)
         _, _, strain = self.element_strains(q)
         _, axial = self.section_forces(q, y)
         bending = np.einsum("pls,seik->pleik", y, self.model.moment)
@@ -191,7 +191,7 @@ class SpatialLagrangian(RodMechanics):
     def effort(self, z: Lanes, p: Parameters) -> Parameters:
         """∂L/∂p."""
         given, y = self.jets(z, p)
-        q = normalised(given)[0]
+        q = normalise(given)[0]
         out = self.by_scalars(q, y)[0]
         slope = self.slope(q, y)[0]
         for side, node in enumerate((0, -1)):
@@ -208,7 +208,7 @@ class SpatialLagrangian(RodMechanics):
     def end_couples(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes 2 3"]:
         """Couples (x, y, z) of the supports on both ends; 0 at free rotations."""
         given, y = self.jets(z, p)
-        q = normalised(given)[0]
+        q = normalise(given)[0]
         slope = self.slope(q, y)[0]
         out = [
             np.stack([0.5 * (product(unit, q[0][:, k]) * slope[:, k]).sum(axis=1)

@@ -29,22 +29,22 @@ def with_phase_condition(model: SpatialModel) -> SpatialModel:
     row = np.zeros_like(model.force[0])
     row[..., 2] = phase_weight(mesh.nodes[mesh.element_nodes])
 
-    def widened(rows: np.ndarray, axis: int) -> np.ndarray:
+    def widen(rows: np.ndarray, axis: int) -> np.ndarray:
         return np.insert(rows, m, 0.0, axis=axis)
 
-    force = widened(model.force, 0)
+    force = widen(model.force, 0)
     force[m] = row
     return replace(
         model,
         multipliers=m + 1,
         force=force,
-        moment=widened(model.moment, 0),
-        tension=widened(model.tension, 0),
-        torsion=widened(model.torsion, 0),
-        quadratic=widened(widened(model.quadratic, 0), 1),
-        turned=widened(model.turned, 2),
-        reaction=widened(model.reaction, 1),
-        origin=widened(model.origin, 1),
+        moment=widen(model.moment, 0),
+        tension=widen(model.tension, 0),
+        torsion=widen(model.torsion, 0),
+        quadratic=widen(widen(model.quadratic, 0), 1),
+        turned=widen(model.turned, 2),
+        reaction=widen(model.reaction, 1),
+        origin=widen(model.origin, 1),
     )
 
 

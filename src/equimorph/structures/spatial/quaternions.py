@@ -158,7 +158,7 @@ def element_slopes(
     return np.asarray(local + np.einsum("eij,pleia->pleja", slopes, spread))
 
 
-def gathered(
+def gather(
     values: Float[np.ndarray, "*batch some width"], at: Int[np.ndarray, " some"], count: int
 ) -> Float[np.ndarray, "*batch count width"]:
     """Sum of the rows that belong to each of `count` places."""
@@ -167,7 +167,7 @@ def gathered(
     return np.moveaxis(out, 0, -2)
 
 
-def normalised(q: Jet) -> tuple[Jet, Jet, Jet]:
+def normalise(q: Jet) -> tuple[Jet, Jet, Jet]:
     """q/|q|, 1/|q| and |q|² of quaternions as jets."""
     square = bilinear(dot, q, q)
     rho = square[0]

@@ -16,8 +16,8 @@ from equimorph.manifold.queries.nearest import SetPoints
 from equimorph.model import Constraint
 from equimorph.structures import State, Structure, margin_of
 from equimorph.tasks.designing.family import Carried, DesignFamily, Vector, check_names
-from equimorph.tasks.designing.pieces import Piece, moved, stable_near, value_piece
-from equimorph.tasks.designing.questions import Answer, LoadLimit, StateValue, unanswered
+from equimorph.tasks.designing.pieces import Piece, carry_over, stable_near, value_piece
+from equimorph.tasks.designing.questions import Answer, LoadLimit, StateValue, no_answer
 from equimorph.tasks.optimising.passes import passes_near
 from equimorph.tasks.optimising.programme import Objective, Programme, match_branches, stability
 from equimorph.tasks.optimising.sqp import CriticalPoint
@@ -68,18 +68,18 @@ class RouteExtreme:
         ends = [stable_near(structure, each) for each in known]
         if ends[0] is None or ends[1] is None:
             word = "start" if ends[0] is None else "goal"
-            return unanswered(f"the {word} of the route is lost or no longer stable")
+            return no_answer(f"the {word} of the route is lost or no longer stable")
         start, goal = ends[0], ends[1]
         eset = self.set_of(structure)
         extreme, within = self._on(structure)
         passing = find_bottleneck(eset, (start, goal), extreme, within, self.margin)
         if passing is None:
-            return unanswered("no stable route within the constraints is known")
+            return no_answer("no stable route within the constraints is known")
         found = passing.bottleneck
         goal_of = Objective(extreme.descriptor, extreme.sign)
         pieces = [value_piece("start", start, goal_of), value_piece("goal", goal, goal_of)]
         if found.kind == "vertex":
-            return unanswered("the peak of the route is known up to the mesh only")
+            return no_answer("the peak of the route is known up to the mesh only")
         if passing.point is not None:
             pieces.append(pass_piece(self, structure, passing.point, passing.reach))
         return Answer(found.value, tuple(pieces), self._bounds(start, goal), (start, goal), found)
@@ -89,20 +89,20 @@ class RouteExtreme:
         given = self.eset
         if structure.signature == given.structure.signature:
             return given
-        within = moved(given.constraints, given.structure, structure)
+        within = carry_over(given.constraints, given.structure, structure)
         return equilibrium_set(
             structure, given.box, fixed=given.fixed, within=within, intervals=given.intervals,
             checks=checks,
         )  # fmt: skip
 
     def _on(self, structure: Structure) -> tuple[Extreme, tuple[Constraint, ...]]:
-        return moved((self.extreme, tuple(self.within)), self.eset.structure, structure)
+        return carry_over((self.extreme, tuple(self.within)), self.eset.structure, structure)
 
     def _bounds(self, start: State, goal: State) -> tuple[Piece, ...]:
         """Excess of both ends over the constraints."""
         structure = start.structure
         all_of = (*self.eset.constraints, *self.within)
-        constraints = list(moved(all_of, self.eset.structure, structure))
+        constraints = list(carry_over(all_of, self.eset.structure, structure))
         if self.margin > 0.0:
             constraints.append(margin_of(structure) >= self.margin)
         found = []
@@ -118,7 +118,7 @@ class RouteExtreme:
     def programme(self, structure: Structure) -> Programme:
         """What is made small within which bounds, on the set of a structure."""
         extreme, within = self._on(structure)
-        constraints = moved(self.eset.constraints, self.eset.structure, structure)
+        constraints = carry_over(self.eset.constraints, self.eset.structure, structure)
         frame = replace(self.eset, structure=structure, constraints=())
         goal = Objective(extreme.descriptor, extreme.sign)
         return Programme.over(

@@ -134,7 +134,7 @@ def value_piece(kind: str, state: State, objective: Objective, bound: float = 0.
     base = values[:, real], places[:, real]
 
     def scalars(made: Structure, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes m"]:
-        there = replace(objective, descriptor=moved(objective.descriptor, old, made))
+        there = replace(objective, descriptor=carry_over(objective.descriptor, old, made))
         lanes = (np.repeat(each, len(z), axis=0) for each in base)
         return match_branches((next(lanes), next(lanes)), there.branches(z, p)) - bound
 
@@ -150,7 +150,7 @@ def value_piece(kind: str, state: State, objective: Objective, bound: float = 0.
     return piece_at(state)
 
 
-def moved(value: Moved, old: Structure, new: Structure) -> Moved:
+def carry_over(value: Moved, old: Structure, new: Structure) -> Moved:
     """Descriptors and constraints of a structure, or records of them, made again for another one.
 
     Raises

@@ -22,7 +22,7 @@ from equimorph.equilibria.trace_options import VIOLATIONS
 from equimorph.model import Constraint, position
 from equimorph.structures import State, Structure
 from equimorph.tasks.designing.family import Carried
-from equimorph.tasks.designing.pieces import Piece, moved, stable_near, value_piece
+from equimorph.tasks.designing.pieces import Piece, carry_over, stable_near, value_piece
 from equimorph.tasks.optimising.programme import Objective
 from equimorph.tasks.planning.objectives import Extreme
 
@@ -70,7 +70,7 @@ class Question(Protocol):
         """Answer for a structure, from scratch; states are sought near those of another one."""
 
 
-def unanswered(why: str) -> Answer:
+def no_answer(why: str) -> Answer:
     """No value, and why."""
     return Answer(np.nan, why=why)
 
@@ -105,8 +105,8 @@ class StateValue:
         """By Newton's method from the state nearby."""
         here = stable_near(structure, near[0] if near else self.state)
         if here is None:
-            return unanswered("the state is lost or no longer stable")
-        descriptor = moved(self.extreme.descriptor, self.state.structure, structure)
+            return no_answer("the state is lost or no longer stable")
+        descriptor = carry_over(self.extreme.descriptor, self.state.structure, structure)
         piece = value_piece("state", here, Objective(descriptor, self.sign))
         return Answer(descriptor(here), (piece,), (), (here,), here)
 
@@ -147,17 +147,17 @@ class LoadLimit:
         """By the path from the state nearby to the first fold or constraint."""
         start = stable_near(structure, near[0] if near else self.start)
         if start is None:
-            return unanswered("the state at the start of the path is lost or no longer stable")
-        within = moved(tuple(self.within), self.start.structure, structure)
+            return no_answer("the state at the start of the path is lost or no longer stable")
+        within = carry_over(tuple(self.within), self.start.structure, structure)
         limit = limit_load(start, self.load, within=within, bound=self.bound)
         if limit.kind == "none below the bound":
             return Answer(limit.value, (), (), (start,), limit)
         if limit.kind != "fold" and limit.kind not in VIOLATIONS:
-            return unanswered(f"the path ends at a {limit.kind}, which has no derivative")
+            return no_answer(f"the path ends at a {limit.kind}, which has no derivative")
         met = None if limit.kind == "fold" else _met(limit, within)
         piece = limit_piece(limit.state, self.load, met)
         if piece is None:
-            return unanswered("the end of the path is lost")
+            return no_answer("the end of the path is lost")
         return Answer(limit.value, (piece,), (), (start,), limit)
 
 
@@ -176,7 +176,7 @@ def limit_piece(guess: State, load: str, met: Constraint | None) -> Piece | None
 
     def find(made: Structure, near: State) -> Piece | None:
         free = np.array([at])
-        constraint = moved(met, old, made)
+        constraint = carry_over(met, old, made)
         target = Fold() if constraint is None else _equality(constraint)
         guards = Guards(lower_index=np.zeros(1, int)) if constraint is None else Guards()
         here = settle(
@@ -197,7 +197,7 @@ def limit_piece(guess: State, load: str, met: Constraint | None) -> Piece | None
             value = -p[:, [at]]
             if met is None:
                 return value
-            return value + weight * moved(met, old, there).excess(z, p)[:, None]
+            return value + weight * carry_over(met, old, there).excess(z, p)[:, None]
 
         kind = "fold" if met is None else "constraint"
         return Piece(kind, state, np.array([-here.p[0, at]]), scalars, free, along, find)

@@ -8,7 +8,7 @@ import numpy as np
 from equimorph.arrays import Lanes, Parameters, Values
 from equimorph.equilibria.soft_modes import metric_length
 from equimorph.manifold import EquilibriumSet
-from equimorph.model import Constraint, Descriptor, eased
+from equimorph.model import Constraint, Descriptor, ease
 from equimorph.structures import States, join_states, stability_margin
 from equimorph.tasks.optimising.programme import Objective
 from equimorph.tasks.planning.bottlenecks import Passing, find_bottleneck
@@ -153,7 +153,7 @@ def route_with_lowest_peak(
     if found is None:
         return refusal(explain_no_route(eset, ends, demands))
     bottleneck, bound = found.bottleneck, found.bound
-    within = replace(demands, constraints=(*demands.constraints, eased(bound)))
+    within = replace(demands, constraints=(*demands.constraints, ease(bound)))
     largest = min(_least_margin(ends, found), _margin_of_ways(eset, ends, (*bounds, bound)))
     for share in (*KEPT, 0.0):
         safe = replace(within, margin=max(within.margin, share * largest))

@@ -15,7 +15,7 @@ from equimorph.equilibria.trace_options import EventCode
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.complex.kept_sets import from_cache
 from equimorph.manifold.geometry.topology import faces_of
-from equimorph.model import Constraint, are_feasible, eased
+from equimorph.model import Constraint, are_feasible, ease
 from equimorph.structures import State, States, Structure, join_states
 from equimorph.tasks.planning.objectives import ROUGH, Objective, Wish, objective_of
 from equimorph.tasks.route import FINE
@@ -59,7 +59,7 @@ class Demands:
         InputError
             For an objective without meaning.
         """
-        constraints = tuple(eased(each) for each in dict.fromkeys(within))
+        constraints = tuple(ease(each) for each in dict.fromkeys(within))
         return cls(objective_of(objective, structure), constraints, margin)
 
     def with_reserves(self, least: float) -> Iterator["Demands"]:

@@ -122,7 +122,7 @@ class Objective:
         places = self.places(states, error)
         return self.between(places[first], places[second])
 
-    def timed(self, schedule: Schedule) -> Schedule:
+    def with_times(self, schedule: Schedule) -> Schedule:
         """A schedule with the times of its rates, if they limit every parameter that moves."""
         for _, term in self.terms:
             if isinstance(term, Rates) and set(schedule.moving) <= set(term.limits):

@@ -151,7 +151,7 @@ class TreePath:
     places: Float[np.ndarray, " nodes"]
 
 
-def joined_path(first: Tree, here: int, second: Tree | None, there: int) -> TreePath:
+def join_paths(first: Tree, here: int, second: Tree | None, there: int) -> TreePath:
     """Path from the root of a tree to that of another."""
     way = first.branch(here)
     z, p, s = first.z[way], first.p[way], first.s[way]

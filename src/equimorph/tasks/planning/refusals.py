@@ -9,7 +9,7 @@ from scipy.sparse.csgraph import connected_components
 
 from equimorph.equilibria.soft_modes import metric_length
 from equimorph.manifold import EquilibriumSet
-from equimorph.model import Descriptor, eased
+from equimorph.model import Descriptor, ease
 from equimorph.structures import State, margin_of
 from equimorph.tasks.planning.bottlenecks import Passing, find_bottleneck
 from equimorph.tasks.planning.free_routes import free_route, route_with_reserve
@@ -110,7 +110,7 @@ def _relaxations(
         if each.found is not None:
             best, bounds = (
                 each.found.bottleneck,
-                (*each.others.constraints, eased(each.found.bound)),
+                (*each.others.constraints, ease(each.found.bound)),
             )
             relaxed = replace(each.others, constraints=bounds)
             route = route_with_reserve(eset, ends, (relaxed, relaxed), (), each.found)

@@ -26,7 +26,7 @@ from equimorph.tasks.planning.random_trees import (
     TreePath,
     constraint_slopes,
     insets,
-    joined_path,
+    join_paths,
     project_onto_constraints,
 )
 from equimorph.tasks.planning.slices import Slices
@@ -243,7 +243,7 @@ class _Search:
             if len(self.trees) == 1:
                 done = new[self.trees[0].s[new] == self.course.legs]
                 if len(done):
-                    return joined_path(self.trees[0], int(done[0]), None, 0)
+                    return join_paths(self.trees[0], int(done[0]), None, 0)
             elif len(new) and (found := self._join(own, new)):
                 return found
             turn += 1
@@ -303,7 +303,7 @@ class _Search:
             return None
         pair = int(mine[good[0]]), int(theirs[good[0]])
         here, there = pair if which == 0 else pair[::-1]
-        return joined_path(self.trees[0], here, self.trees[1], there)
+        return join_paths(self.trees[0], here, self.trees[1], there)
 
 
 def _corners(course: LoadCourse, path: TreePath, demands: Demands) -> Corners:

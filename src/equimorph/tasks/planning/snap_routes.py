@@ -321,7 +321,7 @@ def _join_paths(
     whole = Path(states, np.concatenate(ats), np.concatenate(lengths), index, events)
     margins = np.maximum(states.margin, 0.0)
     told = dict.fromkeys((*(c.descriptor for c in demands.constraints), *monitor))
-    schedule = demands.objective.timed(schedule_of(whole, margins, tuple(told)))
+    schedule = demands.objective.with_times(schedule_of(whole, margins, tuple(told)))
     cost = sum(demands.objective.along(path.states) for path in paths)
     return replace(
         Route("arrived", "", way_points, whole, 0.0, float(before), schedule),

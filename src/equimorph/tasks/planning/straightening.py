@@ -247,7 +247,7 @@ def check_margin(route: Route, demands: Demands) -> Route:
         assert route.path is not None
         assert route.schedule is not None
         aim = demands.objective
-        cost, schedule = aim.along(route.path.states), aim.timed(route.schedule)
+        cost, schedule = aim.along(route.path.states), aim.with_times(route.schedule)
         return replace(route, objective=str(aim), cost=cost, schedule=schedule)
     return refusal(
         f"the stability margin falls to {route.margin:.4g} on the way, below {demands.margin:g}",

@@ -146,7 +146,7 @@ def rest_survives(
 ) -> Survival:
     """Whether a state that rests survives errors: refuted by trials, else taken to do so."""
     erring = ErringStructure(state.structure, errors_of(survive))
-    return Question(state, np.zeros((0, len(state.p))), erring, tuple(within)).tried()
+    return Question(state, np.zeros((0, len(state.p))), erring, tuple(within)).answer_by_trials()
 
 
 @dataclass(frozen=True)
@@ -185,7 +185,7 @@ class Question:
 
     def answer(self) -> Survival:
         """Answer by trials, or by trials and a proof."""
-        found = self.tried()
+        found = self.answer_by_trials()
         if self.errors.probability is not None or not found.survives:
             return found
         proof = self.prove()
@@ -198,7 +198,7 @@ class Question:
         why = f"{proof.why}{place}" if proof.why else ""
         return replace(found, status=statuses[proof.status], why=why, proof=proof)
 
-    def tried(self) -> Survival:
+    def answer_by_trials(self) -> Survival:
         """Answer by trials alone."""
         if self.errors.probability is not None:
             return self._probable(self.errors.probability)
