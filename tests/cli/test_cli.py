@@ -8,10 +8,12 @@ import resource
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
-from equimorph.cli import main
+from equimorph.cli import main, run
+from equimorph.cli.output import Output
 from equimorph.study import Outcome
 from studies import SPRING, draw_dots, with_answers_of
 from typecheck import unchecked
@@ -495,3 +497,18 @@ def test_warnings_of_libraries_do_not_reach_the_user(tmp_path: Path):
     assert (tmp_path / "words.png").exists()
     told = done.stderr.splitlines()
     assert [line for line in told if "findfont" in line or "library" in line] == []
+
+
+@pytest.mark.parametrize(("kept", "compiles"), [((True, True), False), ((True, False), True)])
+def test_kernels_are_compiled_first_if_one_is_missing(kept, compiles, tmp_path, monkeypatch):
+    """A run that meets a kernel without code would compile it in the middle, on one core."""
+    calls = [SimpleNamespace(is_kept=each) for each in kept]
+    done: list[object] = []
+    monkeypatch.setattr(run, "read_problem", lambda _: (None, None, None))
+    monkeypatch.setattr(run, "calls_of", lambda _: calls)
+    monkeypatch.setattr(run, "compile_ahead", done.append)
+    monkeypatch.setattr(run, "run_study", lambda *_, **__: SimpleNamespace(refused=()))
+    monkeypatch.setattr(run, "_show", lambda *_: None)
+    with unchecked():
+        run.run_and_show(tmp_path, tmp_path, Output(quiet=True), replace=False)
+    assert done == ([calls] if compiles else [])

@@ -5,6 +5,7 @@ import pytest
 
 import equimorph as em
 from equimorph.dynamics import ReplaySettings, replay
+from equimorph.dynamics.own import Motion, OwnPlant
 
 ARCH = ({"A": (-1, 0), "B": (0, 0.1), "C": (1, 0)}, [("A", "B"), ("B", "C")])
 HELD = {"A": "xy", "C": "xy"}
@@ -71,3 +72,14 @@ def test_the_own_equations_agree_with_mujoco_on_an_arch():
     again = np.interp(chain.times[:-1], rod.times[:-1], rod.dynamics[:-1])
     assert np.abs(chain.dynamics[:-1] - again).max() < 1e-3
     assert rod.deviation[-1] < 1e-8
+
+
+def test_a_step_in_time_that_newtons_method_loses_is_an_error(monkeypatch):
+    """States after a lost step are none."""
+    start = em.Spring().natural_state(x_l=1.5)
+    plant = OwnPlant(start.structure, start, 0.1, 1.0)
+    plant.step()
+    assert plant.speed < 1e-9
+    monkeypatch.setattr(Motion, "step", lambda motion, *_: (motion, np.zeros(1, bool)))
+    with pytest.raises(ArithmeticError, match="choose a shorter step"):
+        plant.step()

@@ -9,6 +9,7 @@ from equimorph.linalg.intervals import (
     Interval,
     cosine,
     inverse,
+    power,
     product,
     sine,
     square,
@@ -98,3 +99,18 @@ def test_what_is_unknown_stays_unknown():
     unknown = inverse(Interval(np.array([-1.0]), np.array([1.0])))
     for each in (unknown, unknown * 2.0, 3.0 - unknown, unknown - unknown):
         assert np.isinf(each.size).all()
+
+
+def test_powers_are_bounded_for_constant_exponents_where_they_are_defined():
+    """x³ rises, x² turns at 0, 1/x has a pole; of a variable exponent nothing is known."""
+
+    def bounds(low, high, n, most=None):
+        exponent = Interval(np.array([n]), np.array([n if most is None else most]))
+        found = power(Interval(np.array([low]), np.array([high])), exponent)
+        return found.low[0], found.high[0]
+
+    assert bounds(-2.0, 1.0, 3.0) == pytest.approx((-8.0, 1.0))
+    assert bounds(-2.0, 1.0, 2.0) == pytest.approx((0.0, 4.0), rel=1e-12, abs=1e-300)
+    assert bounds(1.0, 4.0, 0.5) == pytest.approx((1.0, 2.0))
+    assert bounds(-1.0, 2.0, -1.0) == (-np.inf, np.inf)
+    assert bounds(1.0, 2.0, 2.0, 3.0) == (-np.inf, np.inf)

@@ -11,11 +11,12 @@ from equimorph.equilibria import settle
 from equimorph.errors import InputError
 from equimorph.structures import Rod, Spring, State, States
 from equimorph.tasks.robustness.erring import ErringStructure, Errors
+from equimorph.tasks.robustness.evidence import Survival
 from equimorph.tasks.robustness.survival import survival, survival_room
 from equimorph.tasks.robustness.trials import random_trials
 from equimorph.tasks.verification.error_box import ErrorBox
 from equimorph.tasks.verification.newton_kantorovich import segment_bounds
-from equimorph.tasks.verification.tube import Tube
+from equimorph.tasks.verification.tube import Tube, TubeProof
 from typecheck import unchecked
 
 pytestmark = pytest.mark.usefixtures("_unchecked")
@@ -245,3 +246,18 @@ def test_a_route_for_barriers_survives_errors_and_is_the_safer_one():
         least.append(field.of(route.states).energy.min())
     assert least[1] > 2.0 * least[0]
     assert random_trials(start, route.schedule, errors, trials=50).arrived.all()
+
+
+@pytest.mark.parametrize(
+    ("why", "proof", "told"),
+    [
+        ("the goal lies beyond a fold", None, "Survival(proved: the goal lies beyond a fold)"),
+        ("", None, "Survival(proved: 2 of 3 trials in corners and inside arrived)"),
+        ("", TubeProof("", 4, "enclosed"), "Survival(proved for F ± 0.01: TubeProof("),
+    ],
+)
+def test_what_shows_survival_is_printed(why, proof, told):
+    """A reason comes first, then a proof, then the trials."""
+    kind = np.array(["arrived", "snapped", "arrived"])
+    given = (Errors({"F": 0.01}), np.zeros((3, 1)), kind, np.ones(3), proof)
+    assert repr(Survival("proved", why, *given)).startswith(told)

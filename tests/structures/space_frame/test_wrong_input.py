@@ -88,3 +88,17 @@ def test_inextensible_members_that_supports_stretch_are_named():
 def test_impossible_members_are_refused(given, text):
     with pytest.raises(InputError, match=text):
         frame(members=[em.SpatialMember(("A", "B"), **given), ("B", "C")])
+
+
+def test_descriptors_are_refused_where_nothing_carries_them():
+    """A free joint has no reaction, one that only ball joints reach does not turn."""
+    balls = [em.SpatialMember(pair, hinges={"B": "ball"}) for pair in BOTH]
+    hung = frame(members=balls, supports={"A": "fixed", "C": "fixed"})
+    with pytest.raises(InputError, match="`B` must be held or sprung by a support; it is free"):
+        hung.reaction("B", "z")
+    with pytest.raises(InputError, match="a joint to which a member is rigidly joined"):
+        hung.rotation("B", "x")
+    with pytest.raises(InputError, match="a member that is hinged about an axis; got none"):
+        hung.hinge("A-B", "B")
+    with pytest.raises(InputError, match="`axis` must be one of t, n, b; got 'x'"):
+        hung.force("A-B", "A", "x")
