@@ -1,6 +1,9 @@
-"""Sets of the arch and of the spring that many tests ask: each is lifted once in a process."""
+"""Sets of the arch and of the spring that many tests ask, lifted once; searches that overlook."""
 
+from dataclasses import replace
 from functools import lru_cache
+
+import numpy as np
 
 from equimorph.manifold import EquilibriumSet, equilibrium_set
 from equimorph.model import Box
@@ -39,3 +42,17 @@ def spring_set(
     box = Box(x_l=(0.3, longest), F=(-0.5, 0.5))
     with unchecked():
         return equilibrium_set(Spring(), box, intervals=intervals, checks=checks)
+
+
+def blind(search, overlooks=lambda states: (states.index == 0) & (states.z[:, 0] <= 2.0)):
+    """Search that overlooks some states: here stable ones at x < 2."""
+
+    def some(*args, **options):
+        found = search(*args, **options)
+        seen = [np.flatnonzero(~overlooks(each)) for each in found]
+        return [
+            replace(each, z=each.z[some], p=each.p[some])
+            for each, some in zip(found, seen, strict=True)
+        ]
+
+    return some

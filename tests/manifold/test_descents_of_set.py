@@ -8,23 +8,10 @@ import pytest
 import equimorph as em
 from equimorph.manifold.lifting import completeness, seeds
 from oracles.close_states import close_roots, close_sheets
+from sets import blind
 from typecheck import unchecked
 
 BOX = em.Box(p=(-1, 1), r=(-1, 1))
-
-
-def blind(search, overlooks=lambda states: (states.index == 0) & (states.z[:, 0] <= 2.0)):
-    """Search that overlooks some states: here stable ones at x < 2."""
-
-    def some(*args, **options):
-        found = search(*args, **options)
-        seen = [np.flatnonzero(~overlooks(each)) for each in found]
-        return [
-            replace(each, z=each.z[some], p=each.p[some])
-            for each, some in zip(found, seen, strict=True)
-        ]
-
-    return some
 
 
 @pytest.mark.parametrize("distance", [0.1, 1e-3])

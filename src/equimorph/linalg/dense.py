@@ -129,12 +129,19 @@ def _solve(
         else np.isfinite(full).all(axis=(1, 2)) & np.isfinite(rhs).all(axis=(1, 2))
     )
     x = np.full(rhs.shape, np.nan)
-    try:
-        x[usable] = np.linalg.solve(full[usable], rhs[usable])
-    except np.linalg.LinAlgError:  # one singular lane fails the batch: go one by one
-        for lane in np.arange(len(full))[usable]:
-            try:
-                x[lane] = np.linalg.solve(full[lane], rhs[lane])
-            except np.linalg.LinAlgError:
-                continue
+    x[usable] = _solve_in_halves(full[usable], rhs[usable])
     return x
+
+
+def _solve_in_halves(
+    full: Float[np.ndarray, "lanes b b"], rhs: Float[np.ndarray, "lanes b sides"]
+) -> Float[np.ndarray, "lanes b sides"]:
+    """Solutions, NaN in singular lanes: one of these fails its batch, which is halved then."""
+    try:
+        return np.asarray(np.linalg.solve(full, rhs))
+    except np.linalg.LinAlgError:
+        if len(full) == 1:
+            return np.full(rhs.shape, np.nan)
+    half = len(full) // 2
+    parts = [_solve_in_halves(full[part], rhs[part]) for part in (slice(half), slice(half, None))]
+    return np.concatenate(parts)

@@ -37,11 +37,12 @@ class Audit:
     `descents` counts how descents from vertices of the strata of index one, and from folds, ended;
     `on_lines` how many equilibria random lines in actuators and loads met that begin at vertices of
     all strata and return to the same parameters. What these found and the set lacked has been
-    added, too. Closed pieces narrower than
-    `cell_size`, the widths of the grid's cells by parameter, may escape all of this. Where two
-    sheets approach each other inside a cell they are followed to where they are nearest, and cells
-    with a neck inside are bisected; `touching`, of which there must be none, are the points at
-    which they touch, like the tip of a cone, or are nearer than states can be told apart.
+    added, too; so have mirror images of its strata, and islands inside cells to which the
+    determinant of F_z leads. Closed pieces narrower than `cell_size`, the widths of the grid's
+    cells by parameter, may escape all of this. Where two sheets approach each other inside a cell
+    they are followed to where they are nearest, and cells with a neck inside are bisected;
+    `touching`, of which there must be none, are the points at which they touch, like the tip of a
+    cone, or are nearer than states can be told apart.
 
     Vertices that the discretisation does not resolve (`unresolved`) belong to a set where curves
     lead to them; the searches found `left_out` others, which it lacks, and which must be zero, too:

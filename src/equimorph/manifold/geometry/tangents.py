@@ -9,6 +9,7 @@ import numpy as np
 from equimorph.arrays import (
     CellNumbers,
     Cells,
+    Flags,
     Float,
     Frames,
     Items,
@@ -25,7 +26,6 @@ from equimorph.equilibria.newton_step import free_directions, weights_of
 from equimorph.equilibria.point_conditions import second_derivatives
 from equimorph.linalg import orthonormal_rows
 from equimorph.manifold.geometry.kernels import square_sides
-from equimorph.manifold.geometry.points import Points
 from equimorph.manifold.geometry.setting import Setting, embed
 from equimorph.model import worst_excess
 from equimorph.tolerances import METRIC_DIFFERENCE
@@ -248,15 +248,19 @@ class FoldForms:
         """
         return np.asarray(-self.slope * np.sign(self.bend)[:, None])
 
+    def parted_by_cusps(self, one: Items, other: Items) -> Flags:
+        """Whether an odd number of cusps lies between points of a fold, given by number."""
+        sense = (self.null[one] * self.null[other]).sum(axis=1) * self.bend[one] * self.bend[other]
+        return np.asarray(sense < 0.0)
 
-def fold_forms(setting: Setting, points: Points, folds: Items) -> FoldForms:
+
+def fold_forms(setting: Setting, z: Lanes, p: Parameters) -> FoldForms:
     """Coefficients at points on folds."""
     structure, free = setting.structure, setting.free
-    z, p = points.z[folds], points.p[folds]
     phi = null_border(structure, z, p)
     none = np.zeros_like(p)
     bend = np.einsum("li,li->l", phi, structure.second_derivative(z, p, (phi, none), (phi, none)))
-    slope = np.empty((len(folds), len(free)))
+    slope = np.empty((len(z), len(free)))
     for k in range(len(free)):
         dp = np.zeros_like(p)
         dp[:, free[k]] = setting.scales[k]

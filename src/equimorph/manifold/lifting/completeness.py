@@ -15,9 +15,11 @@ from equimorph.equilibria.random_search import Ground, Pools
 from equimorph.equilibria.settle import Guards, free_directions, settle
 from equimorph.manifold.complex.base_mesh import BaseMesh
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
+from equimorph.manifold.geometry.points import are_singular
 from equimorph.manifold.geometry.setting import Setting
 from equimorph.manifold.lifting.descents_of_set import descents_of_set, spread_over_strata
-from equimorph.manifold.lifting.grid import bisect, longest_edges
+from equimorph.manifold.lifting.grid import bisect, split_at
+from equimorph.manifold.lifting.hidden_islands import hidden_islands
 from equimorph.manifold.lifting.pairing import Pairing
 from equimorph.manifold.lifting.seeds import Seeds, polish
 from equimorph.manifold.lookup.exact_states import lift_to
@@ -90,8 +92,10 @@ def _missing(eset: EquilibriumSet, places: list[dict[str, float]], seed: int) ->
     begun = len(pools.ground.p)
     met = _within(pools, pools.z[begun:], pools.group[begun:])
     structure = eset.structure
+    beside = _belonging(eset, join_states(structure, [hidden_islands(eset), _mirrored(eset)]))
     found = join_states(structure, [*searched, scattered[np.flatnonzero(resolved)]])
-    lacking = join_states(structure, [_lacking(each, eset) for each in (found, led.landed, met)])
+    told = (found, led.landed, met, beside)
+    lacking = join_states(structure, [_lacking(each, eset) for each in told])
     dropped = [each.unresolved for each in searched if each.unresolved is not None]
     dropped += [_within(pools, *each) for each in pools.unresolved]
     dropped.append(scattered[np.flatnonzero(~resolved)])
@@ -147,6 +151,22 @@ def _within(pools: Pools, z: Lanes, group: Int[np.ndarray, " lanes"]) -> States:
     return States(pools.ground.structure, z[good], pools.ground.p[group[good]])
 
 
+def _mirrored(eset: EquilibriumSet) -> States:
+    """Mirror images of a vertex of each stratum; pieces in corners of the box are hardly met."""
+    plain = ~are_singular(eset.kinds[eset.cells])
+    _, first = np.unique(np.where(plain, eset.stratum[:, None], -1), return_index=True)
+    vertices = eset.cells.ravel()[first]
+    vertices = vertices[plain.ravel()[first]]
+    return join_states(eset.structure, _images(eset.setting, eset.points[vertices]))
+
+
+def _belonging(eset: EquilibriumSet, states: States) -> States:
+    """Those of the states that are resolved and over the box, within the constraints."""
+    good = states.resolved & eset.box.holds(states.p[:, eset.setting.free])
+    good &= are_feasible(eset.constraints, states.z, states.p)
+    return states[np.flatnonzero(good)]
+
+
 def _lacking(found: States, eset: EquilibriumSet) -> States:
     """Those of the states, each over its own point, that a set lacks."""
     return found[np.flatnonzero(~eset.holding(found)[0])]
@@ -189,15 +209,16 @@ def _images(setting: Setting, states: States) -> list[States]:
 
 
 HIDDEN = 12
-"""Rounds of bisection around missing states that bring no new equilibria over grid vertices: of 50
-searches 46 needed six at most."""
+"""Rounds of bisection around missing states that bring no new equilibria over grid vertices."""
 
 
 def recover(pairing: Pairing, missing: States) -> None:
     """Enter equilibria over the corners of grid cells around states that were missing.
 
-    Cells are bisected where that brings nothing new: no corner lies below the piece of the set, or
-    its straight cells leave out the states, which are close to a curved fold.
+    Cells are split at the places of the states where that brings nothing new: no corner lies below
+    the piece of the set, or its straight cells leave out the states, which are close to a curved
+    fold. After as many splits as there are parameters a vertex of the grid lies below a state. Each
+    cell is split for one of them: what that vertex brings may be what the others belong to.
     """
     for _ in range(HIDDEN):
         if pairing.is_full:
@@ -208,8 +229,8 @@ def recover(pairing: Pairing, missing: States) -> None:
         missing = missing[np.setdiff1d(np.arange(len(missing)), origin[ids >= known])]
         if len(missing) == 0 or mesh.dimension == 1:
             return
-        around = np.unique([mesh.locate(point) for point in missing.p[:, pairing.setting.free]])
-        sides = mesh.sides[around] if mesh.dimension == 2 else mesh.sides[mesh.faces[around]]
-        chosen = longest_edges(mesh, sides.reshape(len(around), -1))
+        places = missing.p[:, pairing.setting.free]
+        _, first = np.unique([mesh.locate(place) for place in places], return_index=True)
+        shares = dict(split_at(mesh, place) for place in places[first])
         pairing.fit()
-        pairing.use_mesh(bisect(mesh, chosen))
+        pairing.use_mesh(bisect(mesh, np.array(list(shares), int), shares))

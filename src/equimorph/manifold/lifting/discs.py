@@ -225,7 +225,8 @@ def _continuous(pairing: Pairing, plans: list[Plan], choices: list[Ways]) -> lis
     if not at:
         return choices
     folds = np.array([fold for _, fold in at])
-    normals = fold_forms(pairing.setting, pairing.points, folds).existence
+    points = pairing.points
+    normals = fold_forms(pairing.setting, points.z[folds], points.p[folds]).existence
     flat = _along_sides(pairing, [plans[number].polygon.triangle for number, _ in at], normals)
     flat = flat / np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-300)
     normal = dict(zip(at, flat, strict=True))

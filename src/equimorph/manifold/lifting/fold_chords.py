@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from equimorph.arrays import Bool, Flags, Float, Int, Pairs, Parameters, Places, Some, Values
+from equimorph.arrays import Bool, Flags, Float, Int, Lanes, Pairs, Parameters, Places, Some, Values
 from equimorph.columns import Columns
 from equimorph.manifold.geometry.exact_points import pin
 from equimorph.manifold.geometry.points import VertexKind
@@ -23,6 +23,9 @@ from equimorph.manifold.lifting.stationary_points import Starts
 
 SHARP = 0.5
 """Cosine of the angle between the sides of a fold at both ends below which it turns sharply."""
+BACK = -0.5
+"""Cosine of the angle between the sides of a fold at an end and in the middle below which the
+middle is not where it turns."""
 BENT = 0.97
 """The same cosine below which the set may go on where the fold turns: at a neck."""
 NEAR = -0.5
@@ -76,12 +79,11 @@ def fold_chords(pairing: Pairing, cells: Cells, wanted: Bool[np.ndarray, " T"]) 
     ends, triangle = chords_across(pairing, cells.folds, wanted)
     points = pairing.points
     used, place = np.unique(ends, return_inverse=True)
-    forms, place = fold_forms(pairing.setting, points, used), place.reshape(ends.shape)
+    forms = fold_forms(pairing.setting, points.z[used], points.p[used])
+    place = place.reshape(ends.shape)
     length = np.linalg.norm(forms.existence, axis=1, keepdims=True)
     normals = forms.existence / np.maximum(length, 1e-300)
-    null, bend = forms.null[place], forms.bend[place]
-    sense = (null[:, 0] * null[:, 1]).sum(axis=1) * bend[:, 0] * bend[:, 1]
-    return FoldChords(ends, triangle, normals[place], sense < 0.0)
+    return FoldChords(ends, triangle, normals[place], forms.parted_by_cusps(*place.T))
 
 
 @dataclass(frozen=True)
@@ -103,14 +105,33 @@ class Turns(Columns):
 def sharp_turns(pairing: Pairing, chords: FoldChords) -> Turns | None:
     """Folds that turn sharply, with their middles; None if there are none."""
     sharp = chords.take(chords.cosines < SHARP)
-    known = np.array([chord_of(*pair) in pairing.tips for pair in sharp.ends.tolist()], bool)
-    sharp = sharp.take(~known)
+    parted = np.array([chord_of(*pair) in pairing.tips for pair in sharp.ends.tolist()], bool)
+    sharp = sharp.take(~parted)
     if len(sharp.ends) == 0:
         return None
     span = planes(pairing, sharp.triangle.tolist())
     middle = pin(pairing.setting, pairing.points, sharp.ends.tolist(), VertexKind.FOLD, span)
     inside = middle.found & lie_inside(pairing, sharp.triangle, middle.p)
+    known = np.flatnonzero(inside)
+    inside[known] = _lie_between(pairing, sharp.ends[known], middle.z[known], middle.p[known])
     return Turns(sharp.ends, sharp.triangle, sharp.normals, middle.z, middle.p, inside)
+
+
+def _lie_between(pairing: Pairing, ends: Pairs, z: Lanes, p: Parameters) -> Flags:
+    """Whether folds turn from each of two ends to a third point by part of a half turn only.
+
+    Else, or if a cusp lies between, the point is on another part of the fold.
+    """
+    points, lanes = pairing.points, np.arange(len(ends))
+    both = ends.T.ravel()
+    known = (np.concatenate(each) for each in ((points.z[both], z), (points.p[both], p)))
+    forms = fold_forms(pairing.setting, *known)
+    normals = forms.existence / np.linalg.norm(forms.existence, axis=1, keepdims=True)
+    good, middle = np.ones(len(ends), bool), 2 * len(ends) + lanes
+    for end in (lanes, len(ends) + lanes):
+        good &= ~forms.parted_by_cusps(end, middle)
+        good &= (normals[end] * normals[middle]).sum(axis=1) > BACK
+    return good
 
 
 def lie_inside(pairing: Pairing, triangle: Some, p: Parameters) -> Flags:

@@ -11,7 +11,9 @@ import numpy as np
 
 from equimorph.arrays import Float, Int, Items, Place, Some
 from equimorph.manifold.complex.base_mesh import BaseMesh, mesh_of
+from equimorph.manifold.geometry.simplices import barycentric
 from equimorph.model import Box
+from equimorph.tolerances import IN_BOX
 
 SHIFT = 0.02
 """Largest shift of a grid line off its regular place, in intervals."""
@@ -22,6 +24,9 @@ parameter with the same lines as another one."""
 
 ASIDE = 0.1
 """Part of an edge by which the point that splits it is moved off a line of symmetry."""
+
+NEAR_AN_END = 0.02
+"""Part of an edge within which nothing is split off: slivers serve nobody."""
 
 MARGIN = 0.2
 """How far the coarse grid reaches beyond the box, in ranges of the parameters."""
@@ -252,3 +257,22 @@ def longest_edges(mesh: BaseMesh, sides: Int[np.ndarray, "rows sides"]) -> Items
     ends = mesh.vertices[mesh.edges[sides]] / np.ptp(mesh.vertices, axis=0)
     length = np.linalg.norm(ends[:, :, 0] - ends[:, :, 1], axis=2)
     return np.unique(sides[np.arange(len(sides)), length.argmax(axis=1)])
+
+
+def split_at(mesh: BaseMesh, place: Place) -> tuple[int, float]:
+    """Edge around a place to split, and the part of the way along it at which.
+
+    Then the place lies on a face of its cell of one dimension less, in the end on a vertex. Where
+    that would part a sliver off, the longest edge is split in the middle.
+    """
+    cell, d = mesh.locate(place), mesh.dimension
+    shares = barycentric(mesh.vertices[mesh.cells[[cell]]], place)[0]
+    sides = mesh.sides[cell] if d == 2 else np.unique(mesh.sides[mesh.faces[cell]])
+    corners = mesh.cells[cell].tolist()
+    ends = np.array([[corners.index(end) for end in mesh.edges[side]] for side in sides.tolist()])
+    weights = shares[ends]
+    beside = weights.sum(axis=1) > IN_BOX  # else it lies on the other corners, up to round-off
+    part = np.where(beside, weights[:, 1], 0.0) / np.where(beside, weights.sum(axis=1), 1.0)
+    fair = sides[(part > NEAR_AN_END) & (part < 1.0 - NEAR_AN_END)]
+    edge = int(longest_edges(mesh, (fair if len(fair) else sides)[None])[0])
+    return edge, float(part[sides == edge][0]) if len(fair) else 0.5

@@ -9,7 +9,6 @@ See docs/decisions.md, "Approaching sheets are followed to where they are neares
 """
 
 from dataclasses import dataclass
-from itertools import combinations_with_replacement, product
 
 import numpy as np
 
@@ -19,6 +18,7 @@ from equimorph.equilibria.critical import null_border
 from equimorph.equilibria.settle import free_directions
 from equimorph.manifold.geometry.crossings import Reduction, reduction
 from equimorph.manifold.geometry.points import Points
+from equimorph.manifold.geometry.quadratics import least_in_simplex, monomials
 from equimorph.manifold.geometry.setting import Setting
 from equimorph.manifold.geometry.topology import keys_of
 from equimorph.manifold.lifting.cells import Cells
@@ -177,8 +177,6 @@ VARYING = 1.5
 not approach each other."""
 MOST = 0.5
 """Share of the cells that must be looked at for their surroundings to tell."""
-SUBDIVISIONS = 4
-"""Of the lattice in each cell on which the least value of the model is sought."""
 
 Corners = Int[np.ndarray, "n corners"]
 Shares = Float[np.ndarray, "n corners"]
@@ -247,7 +245,7 @@ def _models(pairing: Pairing, pairs: _Pairs, over: _Corners) -> tuple[Values, Sh
     along = np.einsum("ncd,nkd->nck", slope[over.place], corners[:, 1:] - corners[:, :1])
     squared = over.squared[over.place]
     data = np.concatenate([squared, along.reshape(len(along), (d + 1) * d)], axis=1)
-    least, shares = _least(data @ np.linalg.pinv(_data(d)).T, d)
+    least, shares = least_in_simplex(data @ np.linalg.pinv(_data(d)).T, d)
     return least / np.maximum(squared.min(axis=1), 1e-300), shares
 
 
@@ -303,34 +301,6 @@ def _pairs(pairing: Pairing, cells: Cells, wanted: Some) -> _Pairs:
     )
 
 
-def _least(terms: Float[np.ndarray, "n terms"], d: int) -> tuple[Values, Shares]:
-    """Least values of quadratic polynomials on a simplex, and where: on a lattice, or inside."""
-    rows = [r for r in product(range(SUBDIVISIONS + 1), repeat=d) if sum(r) <= SUBDIVISIONS]
-    lattice = np.array(rows) / SUBDIVISIONS
-    values = terms @ _monomials(lattice).T
-    best = values.argmin(axis=1)
-    least, place = values.min(axis=1), lattice[best]
-    slope, bend = terms[:, 1 : 1 + d], np.zeros((len(terms), d, d))
-    for number, (i, j) in enumerate(combinations_with_replacement(range(d), 2)):
-        bend[:, i, j] += terms[:, 1 + d + number]
-        bend[:, j, i] += terms[:, 1 + d + number]
-    regular = np.abs(np.linalg.det(bend)) > 0.0
-    inner = np.full((len(terms), d), -1.0)
-    inner[regular] = -np.linalg.solve(bend[regular], slope[regular, :, None])[:, :, 0]
-    value = terms[:, 0] + 0.5 * (slope * inner).sum(axis=1)
-    better = (inner >= 0.0).all(axis=1) & (inner.sum(axis=1) <= 1.0) & (value < least)
-    place = np.where(better[:, None], inner, place)
-    shares = np.concatenate([1.0 - place.sum(axis=1, keepdims=True), place], axis=1)
-    return np.where(better, value, least), shares
-
-
-def _monomials(at: Float[np.ndarray, "points d"]) -> Float[np.ndarray, "points terms"]:
-    """1, coordinates, and their products."""
-    pairs = combinations_with_replacement(range(at.shape[1]), 2)
-    products = [at[:, i] * at[:, j] for i, j in pairs]
-    return np.stack([np.ones(len(at)), *at.T, *products], axis=1)
-
-
 def _data(d: int) -> Float[np.ndarray, "data terms"]:
     """What quadratic polynomials have at the corners of a simplex, by their terms.
 
@@ -339,7 +309,7 @@ def _data(d: int) -> Float[np.ndarray, "data terms"]:
     corners = np.concatenate([np.zeros((1, d)), np.eye(d)])
     # central differences of quadratic polynomials are exact
     ahead, behind = (
-        [_monomials(corner + sign * np.eye(d)) for corner in corners] for sign in (1.0, -1.0)
+        [monomials(corner + sign * np.eye(d)) for corner in corners] for sign in (1.0, -1.0)
     )
     slopes = 0.5 * (np.concatenate(ahead) - np.concatenate(behind))
-    return np.concatenate([_monomials(corners), slopes])
+    return np.concatenate([monomials(corners), slopes])

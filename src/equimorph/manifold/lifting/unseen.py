@@ -20,13 +20,11 @@ from equimorph.manifold.lifting.fold_chords import (
     sharp_turns,
     ways_out,
 )
+from equimorph.manifold.lifting.grid import NEAR_AN_END
 from equimorph.manifold.lifting.pairing import Pairing
 from equimorph.manifold.lifting.polygon_cuts import chord_of
 from equimorph.manifold.lifting.stationary_points import approaches, stationary_points
 from equimorph.tolerances import SAME_STATE
-
-NEAR_AN_END = 0.02
-"""Part of an edge within which nothing is split off: slivers serve nobody."""
 
 Places = Float[np.ndarray, "t d"]
 

@@ -1,0 +1,171 @@
+"""States inside cells of a set whose index their corners do not show: islands between folds.
+
+The determinant of F_z vanishes on folds and on crossings of sheets. Where a closed curve of these
+lies inside a cell, it has a minimum of the other sign there. On every cell it is modelled by a
+quadratic polynomial, through its values at the corners of the cell and of its neighbours, in
+coordinates along the set; where that dips, smaller and smaller simplices on the set lead to the
+minimum.
+
+See docs/decisions.md, "Determinants lead to islands inside cells".
+"""
+
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from equimorph.arrays import Cells, Float, ItemValues
+from equimorph.columns import Columns
+from equimorph.equilibria.determinants import determinants
+from equimorph.equilibria.settle import Guards, free_directions, settle
+from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
+from equimorph.manifold.geometry.points import are_singular
+from equimorph.manifold.geometry.quadratics import least_in_simplex, through_corners
+from equimorph.manifold.geometry.setting import Setting, embed
+from equimorph.manifold.geometry.topology import adjacency
+from equimorph.structures import States, join_states
+
+DEEP = 0.5
+"""Share of the least determinant at the corners of a simplex below which its minimum is sought."""
+VARYING = 2.0
+"""Ratio of the largest determinant around a cell to the least one at its corners below which it
+cannot dip inside."""
+NARROWER = 1.0 / 3.0
+"""Size of each simplex, relative to the one before; the first is as large as the cell."""
+ZOOMS = 5
+"""Simplices in each other: the last ones are 81 times smaller than the cell."""
+ITERATIONS = 8
+"""Of Newton's method, at most."""
+NOWHERE = -1
+"""Instead of a vertex: there is no cell beyond this side."""
+
+Shares = Float[np.ndarray, "n corners"]
+
+
+@dataclass(frozen=True)
+class _Patches(Columns):
+    """Simplices on a set: states at their corners, and then at other points nearby.
+
+    sign: of the determinants at the corners of the cell that they lie on; determinants: times that;
+    deep: value below which they dip.
+    """
+
+    sign: ItemValues
+    deep: ItemValues
+    z: Float[np.ndarray, "n points size"]
+    p: Float[np.ndarray, "n points parameters"]
+    determinants: Float[np.ndarray, "n points"]
+
+
+def hidden_islands(eset: EquilibriumSet) -> States:
+    """Equilibria inside cells of a set that have not the index of these: one in each grid cell."""
+    setting, d = eset.setting, len(eset.names)
+    empty = eset.points[:0]
+    if d == 1 or len(eset.cells) == 0:  # edges are traced, and have no inside besides
+        return empty
+    patches, size, found = _of_cells(eset), 1.0, [empty]
+    least, centres, _ = _models(setting, patches)
+    for _ in range(ZOOMS):
+        deep = np.flatnonzero(least < patches.deep)
+        if len(deep) == 0:
+            break
+        patches = _inside(setting, patches.take(deep), centres[deep], size)
+        other = (patches.determinants < 0.0).any(axis=1)
+        found.append(_lowest(setting, patches.take(other)))
+        whole = np.isfinite(patches.determinants[:, : d + 1]).all(axis=1)
+        patches, size = patches.take(whole & ~other), NARROWER
+        least, centres = _lowest_known(setting, patches)
+    states = join_states(setting.structure, found)
+    cells = [eset.mesh.locate(place) for place in states.p[:, setting.free]]
+    return states[np.unique(cells, return_index=True)[1]]
+
+
+def _of_cells(eset: EquilibriumSet) -> _Patches:
+    """Cells with the vertices across their sides, off folds and crossings, where much varies."""
+    vertices, singular = eset.points, are_singular(eset.kinds)
+    known = np.zeros(len(singular))
+    known[~singular] = determinants(eset.structure, vertices.z[~singular], vertices.p[~singular])
+    plain = np.flatnonzero(~singular[eset.cells].any(axis=1))
+    around = np.concatenate([eset.cells, _across(eset.cells)], axis=1)[plain]
+    values = np.where(around == NOWHERE, np.nan, known[around])
+    sign = np.sign(values[:, 0])
+    values *= sign[:, None]
+    low = values[:, : eset.cells.shape[1]].min(axis=1)
+    varying = np.flatnonzero(np.fmax.reduce(values, axis=1) > VARYING * low)
+    sign, low, around, values = (each[varying] for each in (sign, low, around, values))
+    return _Patches(sign, DEEP * low, vertices.z[around], vertices.p[around], values)
+
+
+def _across(cells: Cells) -> Cells:
+    """Vertices of the neighbours of cells opposite to the sides between them."""
+    whole = adjacency(cells)
+    out = np.full(cells.shape, NOWHERE)
+    links, across = whole.links[whole.manifold], whole.across[whole.manifold]
+    for one, other in (links.T, links[:, ::-1].T):
+        own = (whole.cell_facets[one] == across[:, None]).argmax(axis=1)
+        opposite = (whole.cell_facets[other] == across[:, None]).argmax(axis=1)
+        out[one, own] = cells[other, opposite]
+    return out
+
+
+def _models(
+    setting: Setting, patches: _Patches
+) -> tuple[ItemValues, Shares, Float[np.ndarray, "n others d"]]:
+    """Least values of the models in their simplices, and where; coordinates of the other points."""
+    d = len(setting.free)
+    n, points = patches.determinants.shape
+    if n == 0:
+        return np.zeros(0), np.zeros((0, d + 1)), np.zeros((0, points - d - 1, d))
+    rows = (np.concatenate(each) for each in (patches.z, patches.p))
+    y = embed(setting, *rows).reshape(n, points, -1)
+    away = y - y[:, :1]
+    sides, others = away[:, 1 : d + 1], away[:, d + 1 :]
+    gram = sides @ np.swapaxes(sides, 1, 2)
+    at = np.swapaxes(np.linalg.solve(gram, sides @ np.swapaxes(others, 1, 2)), 1, 2)
+    corners, values = np.split(patches.determinants, [d + 1], axis=1)
+    return *least_in_simplex(through_corners(corners, at, values), d), at
+
+
+def _lowest_known(setting: Setting, patches: _Patches) -> tuple[ItemValues, Shares]:
+    """Least values of the models, or of other points, which may lie lower; and where."""
+    least, shares, at = _models(setting, patches)
+    values = patches.determinants[:, shares.shape[1] :]
+    lowest = np.where(np.isnan(values), np.inf, values).argmin(axis=1)
+    value, place = (each[np.arange(len(least)), lowest] for each in (values, at))
+    lower = value < least
+    whole = np.concatenate([1.0 - place.sum(axis=1, keepdims=True), place], axis=1)
+    return np.where(lower, value, least), np.where(lower[:, None], whole, shares)
+
+
+def _inside(setting: Setting, patches: _Patches, shares: Shares, size: float) -> _Patches:
+    """Smaller simplices on the set, with the middles of their sides, around places in others."""
+    structure, d = setting.structure, len(setting.free)
+    pattern = _pattern(d)
+    weights = shares[:, None] + size * (pattern - 1.0 / (d + 1.0))
+    n, points = weights.shape[:2]
+    z, p = (np.concatenate(weights @ each[:, : d + 1]) for each in (patches.z, patches.p))
+    directions = free_directions(structure, setting.free, len(z))
+    guards = Guards(iterations=ITERATIONS)
+    found = settle(structure, z, p, directions, guards=guards, frames=False)
+    values = np.repeat(patches.sign, points) * determinants(structure, found.z, found.p)
+    values[~found.found] = np.nan
+    return _Patches(
+        patches.sign,
+        patches.deep,
+        found.z.reshape(n, points, -1),
+        found.p.reshape(n, points, -1),
+        values.reshape(n, points),
+    )
+
+
+def _pattern(d: int) -> Float[np.ndarray, "points corners"]:
+    """Barycentric coordinates of the corners of a simplex, and of the middles of its sides."""
+    corners = np.eye(d + 1)
+    middles = [0.5 * (corners[i] + corners[j]) for i, j in combinations(range(d + 1), 2)]
+    return np.concatenate([corners, middles])
+
+
+def _lowest(setting: Setting, patches: _Patches) -> States:
+    """States of simplices at which the determinant is least."""
+    least, every = np.nanargmin(patches.determinants, axis=1), np.arange(len(patches.sign))
+    return States(setting.structure, patches.z[every, least], patches.p[every, least])
