@@ -15,14 +15,14 @@ from equimorph.equilibria.random_search import Ground, Pools
 from equimorph.equilibria.settle import Guards, free_directions, settle
 from equimorph.manifold.complex.base_mesh import BaseMesh
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
-from equimorph.manifold.geometry.points import are_singular
 from equimorph.manifold.geometry.setting import Setting
+from equimorph.manifold.geometry.simplices import volumes
 from equimorph.manifold.lifting.descents_of_set import descents_of_set, spread_over_strata
 from equimorph.manifold.lifting.grid import bisect, split_at
 from equimorph.manifold.lifting.hidden_islands import hidden_islands
 from equimorph.manifold.lifting.pairing import Pairing
 from equimorph.manifold.lifting.seeds import Seeds, polish
-from equimorph.manifold.lookup.exact_states import lift_to
+from equimorph.manifold.lookup.exact_states import exact_states, lift_to
 from equimorph.model import Progress, are_feasible, position
 from equimorph.structures import States, join_states
 
@@ -152,12 +152,17 @@ def _within(pools: Pools, z: Lanes, group: Int[np.ndarray, " lanes"]) -> States:
 
 
 def _mirrored(eset: EquilibriumSet) -> States:
-    """Mirror images of a vertex of each stratum; pieces in corners of the box are hardly met."""
-    plain = ~are_singular(eset.kinds[eset.cells])
-    _, first = np.unique(np.where(plain, eset.stratum[:, None], -1), return_index=True)
-    vertices = eset.cells.ravel()[first]
-    vertices = vertices[plain.ravel()[first]]
-    return join_states(eset.structure, _images(eset.setting, eset.points[vertices]))
+    """Mirror images of a state on the largest cell of each stratum.
+
+    Pieces in corners of the box are hardly met.
+    """
+    structure, size = eset.structure, np.abs(volumes(eset.coordinates[eset.cells]))
+    order = np.lexsort((-size, eset.stratum))
+    largest = order[np.unique(eset.stratum[order], return_index=True)[1]]
+    p, guess = (each[eset.cells[largest]].mean(axis=1) for each in (eset.points.p, eset.points.z))
+    z, found, index = exact_states(structure, guess, p, eset.cell_index[largest])
+    good = found & (index == eset.cell_index[largest])
+    return join_states(structure, _images(eset.setting, States(structure, z[good], p[good])))
 
 
 def _belonging(eset: EquilibriumSet, states: States) -> States:

@@ -70,7 +70,7 @@ def hidden_islands(eset: EquilibriumSet) -> States:
         if len(deep) == 0:
             break
         patches = _inside(setting, patches.take(deep), centres[deep], size)
-        other = (patches.determinants < 0.0).any(axis=1)
+        other = np.asarray((patches.determinants < 0.0).any(axis=1))
         found.append(_lowest(setting, patches.take(other)))
         whole = np.isfinite(patches.determinants[:, : d + 1]).all(axis=1)
         patches, size = patches.take(whole & ~other), NARROWER
