@@ -3,9 +3,11 @@
 import numpy as np
 import pytest
 from matplotlib.collections import LineCollection
+from matplotlib.colors import to_hex
 
 import equimorph as em
 from equimorph import plotting
+from equimorph.plotting import style
 from sets import spring_set
 from typecheck import unchecked
 
@@ -33,6 +35,9 @@ def test_stable_pieces_are_full_lines_and_folds_are_marked(branch, spring):
     drawn = [each for each in ax.collections if isinstance(each, LineCollection)]
     assert [len(each.get_segments()) for each in drawn] == [2, 1]
     assert drawn[0].get_linewidths()[0] > drawn[1].get_linewidths()[0]
+    shown = [to_hex(style.INK), to_hex(style.index_colour(1))]
+    assert [to_hex(each.get_color()[0]) for each in drawn] == shown
+    assert [to_hex(each.get_color()) for each in ax.get_legend().legend_handles[:2]] == shown
     words = [text.get_text() for text in ax.get_legend().get_texts()]
     assert words == ["stable", "index 1", "fold"]
     (folds,) = (line for line in ax.lines if line.get_label() == "fold")
