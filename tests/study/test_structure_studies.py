@@ -186,7 +186,7 @@ WRONG_TRUSS = {
     "a mechanism": (
         'C = "xy"',
         'C = "x"',
-        r"in `structure`: `truss` must be no mechanism; joint C",
+        r"in `structure`: `truss` must not be a mechanism; joint C",
     ),
     "a joint that is none": ('["A", "B"]', '["A", "D"]', r"`ends` of bar A-D must be joints"),
     "no stiffness": ("EA = 1.0", "EA = 0.0", r"`structure\.bars\[0\]\.EA` must be greater than 0"),
@@ -204,7 +204,7 @@ WRONG_TRUSS = {
     ),
 }
 WRONG_FRAME = {
-    "a mechanism": ('A = "pinned", D = "pinned"', 'A = "pinned"', r"`frame` must be no mechanism"),
+    "a mechanism": ('A = "pinned", D = "pinned"', 'A = "pinned"', r"must not be a mechanism"),
     "drift": ('A = "pinned", D = "pinned"', 'A = "x", D = "x"', r"nothing holds it in y"),
     "a joint that is none": ('["A", "B"]', '["A", "E"]', r"`ends` of member A-E must be joints"),
     "no stiffness": ("EI = 1.0", "EI = 0.0", r"`structure\.members\[0\]\.EI` must be greater"),

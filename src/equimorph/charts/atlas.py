@@ -123,7 +123,7 @@ class Transition:
 
 @dataclass(frozen=True, eq=False)
 class Atlas:
-    """Charts over the free parameters that cover a set, each state in one of them.
+    """Charts over the free parameters that together cover a set, each state once.
 
     Parameters
     ----------

@@ -49,7 +49,7 @@ class PointStatus(IntEnum):
 
 @dataclass(frozen=True, eq=False)
 class Charted:
-    """Answers of a chart, one per point.
+    """States that a chart gives for coordinates, one per point.
 
     Parameters
     ----------

@@ -185,7 +185,7 @@ def _nearest(
 
 @dataclass(frozen=True, eq=False)
 class Overlap:
-    """Coordinates that more than one state has.
+    """Coordinates at which there is more than one state.
 
     Parameters
     ----------

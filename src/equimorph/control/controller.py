@@ -28,7 +28,7 @@ Command = Mapping[str, float]
 
 
 class Controller:
-    """Lead a structure to a goal by measured values, under loads that are not known.
+    """Controller that leads a structure to a goal by measured values, under unknown loads.
 
     In each step the state and the unknown loads are estimated from the measurement and the belief
     before it. The next stride is lifted under the estimated loads and under those that are likely,

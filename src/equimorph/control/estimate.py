@@ -43,7 +43,7 @@ class ControlStatus(StrEnum):
 
 @dataclass(frozen=True)
 class Belief:
-    """What a controller believes and commands; it changes by steps of the controller only.
+    """Estimate and command of a controller; only steps of the controller change it.
 
     Parameters
     ----------

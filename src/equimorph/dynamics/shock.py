@@ -86,7 +86,7 @@ class Shock:
 
 @dataclass(frozen=True, eq=False)
 class LeastShock:
-    """How hard a stable state may be disturbed, by energy and by what was tried.
+    """Least disturbances of a stable state: the energy barrier, and each kind that was tried.
 
     Parameters
     ----------

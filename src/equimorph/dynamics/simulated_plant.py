@@ -19,7 +19,7 @@ QUIET = 1e-3
 
 
 class SimulatedPlant:
-    """A structure in a simulator, in the place of hardware: parameters in, measured values out.
+    """A structure in a simulator instead of hardware: it takes parameters and returns measurements.
 
     Parameters
     ----------

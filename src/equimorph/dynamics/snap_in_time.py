@@ -47,7 +47,7 @@ class HeldLanding:
 
 @dataclass(frozen=True, eq=False)
 class SnapInTime:
-    """A fold or a branch point in a simulator.
+    """What a simulator does at a fold or a branch point.
 
     Parameters
     ----------

@@ -59,7 +59,7 @@ class HalfPlane:
 @check_arguments
 @dataclass(frozen=True)
 class Disc:
-    """A forbidden disc, or with `inside` a round room that must not be left.
+    """A disc that the shape must not enter or, with `inside`, must not leave.
 
     For a structure in space it is a cylinder without end along the z-axis.
 

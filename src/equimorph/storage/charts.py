@@ -91,7 +91,7 @@ def write_chart(group: h5py.Group, chart: Chart | Atlas) -> None:
     elif isinstance(chart, DescriptorChart):
         about["chosen"] = list(chart.names)
     elif not isinstance(chart, Projection | Atlas):
-        raise InputError(f"`chart` must be no part of an atlas; got {chart}. Write the atlas.")
+        raise InputError(f"`chart` must not be part of an atlas; got {chart}. Write the atlas.")
     write_set(group.create_group(SET), eset)
     if isinstance(chart, Atlas):
         put(group, "chart", chart.chart, ["cell"], "number of the chart of each cell")

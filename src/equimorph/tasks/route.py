@@ -60,7 +60,7 @@ class Bottleneck:
 
 @dataclass(frozen=True, eq=False)
 class Relaxation:
-    """How far one demand of a refused route has to give way, all others as they are.
+    """How far one demand of a refused route must be relaxed, while all others are kept.
 
     Parameters
     ----------

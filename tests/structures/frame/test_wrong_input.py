@@ -23,12 +23,12 @@ def made(joints=JOINTS, members=MEMBERS, supports=HELD, loads=LOADS, actuators=N
     ("arguments", "text"),
     [
         # mechanisms, and members held twice
-        ({"supports": {"A": "y"}}, "`frame` must be no mechanism; nothing holds it in x"),
-        ({"supports": {"A": "x"}}, "`frame` must be no mechanism; nothing holds it in y"),
-        ({"supports": {"A": "pinned"}}, "no mechanism; joint B can move along (1, 0) without"),
+        ({"supports": {"A": "y"}}, "`frame` must not be a mechanism; nothing holds it in x"),
+        ({"supports": {"A": "x"}}, "`frame` must not be a mechanism; nothing holds it in y"),
+        ({"supports": {"A": "pinned"}}, "a mechanism; joint B can move along (1, 0) without"),
         (
             {"supports": {"A": "pinned", "C": "y"}, "members": HINGED},
-            "no mechanism; joint B can move along (1, 0) without force. Add a member or a support",
+            "a mechanism; joint B can move along (1, 0) without force. Add a member or a support",
         ),
         (
             {"joints": {"A": (0, 0), "B": (1, 0), "C": (2, 0)}},

@@ -21,12 +21,12 @@ def made(joints=JOINTS, bars=BARS, supports=HELD, loads=LOADS, **more):
     ("arguments", "text"),
     [
         # mechanisms
-        ({"supports": {"A": "x", "C": "xy"}}, "`truss` must be no mechanism; joint A can move"),
+        ({"supports": {"A": "x", "C": "xy"}}, "`truss` must not be a mechanism; joint A can move"),
         ({"supports": {}}, "without force. Add a bar or a support"),
-        ({"joints": {**JOINTS, "B": (0, 0)}}, "no mechanism; joint B can move along (0, 1)"),
+        ({"joints": {**JOINTS, "B": (0, 0)}}, "not be a mechanism; joint B can move along (0, 1)"),
         (
             {"joints": {**JOINTS, "D": (0, 1)}, "bars": [*BARS, ("B", "D")]},
-            "no mechanism; joint D can move along (1, 0) without force",
+            "not be a mechanism; joint D can move along (1, 0) without force",
         ),
         # joints
         ({"joints": {**JOINTS, "D": (0, 1)}}, "`bars` must reach every joint; got none at D"),

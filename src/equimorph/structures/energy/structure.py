@@ -45,7 +45,7 @@ INDEPENDENCE = "constraint_independence"
 
 
 class EnergyStructure(DiscreteStructure):
-    """Structure with an energy E(u; p) and constraints c(u; p) = 0 that its author writes down.
+    """Structure defined by formulas: an energy E(u; p) and constraints c(u; p) = 0.
 
     All derivatives are exact: CasADi [Andersson2019]_ forms the graphs of residual, KKT matrix, and
     their derivatives, and they run as tapes of instructions on a vector of lanes at a time. The

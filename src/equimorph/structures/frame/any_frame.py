@@ -162,7 +162,7 @@ class AnyFrame(StressedFrame, Shortening):
             piece = int(np.argmax(ends.reshape(len(ends), -1).max(axis=1)))
             what = f"member {made.name_of_member(piece)} can turn about itself"
         raise InputError(
-            f"`frame` must be no mechanism; {what} without force. Add a member or a support, or "
+            f"`frame` must not be a mechanism; {what} without force. Add a member or a support, or "
             "leave out a hinge."
         )
 

@@ -249,7 +249,7 @@ def frame_network(
     for axis, stiff in zip(AXES, held.T[:2], strict=False):
         if not stiff.any():
             raise InputError(
-                f"`frame` must be no mechanism; nothing holds it in {axis}. Add a support."
+                f"`frame` must not be a mechanism; nothing holds it in {axis}. Add a support."
             )
     return result
 

@@ -150,7 +150,7 @@ class SpaceStatics:
             supported = np.array([bool((np.abs(d[:, axis]) > NOTHING).any()) for d in self.held])
             if not supported.any():
                 raise InputError(
-                    f"`frame` must be no mechanism; nothing holds it in {'xyz'[axis]}. Add a "
+                    f"`frame` must not be a mechanism; nothing holds it in {'xyz'[axis]}. Add a "
                     "support."
                 )
             same = [each for each in found if np.array_equal(each.supported, supported)]
@@ -217,7 +217,7 @@ class SpaceStatics:
             if np.abs(supports[:, j] @ direction).max(initial=0.0) > 1e-9:
                 written = ", ".join(f"{x:.3g}" for x in direction + 0.0)
                 raise InputError(
-                    f"`frame` must be no mechanism; joint {self.joints[j]} can move along "
+                    f"`frame` must not be a mechanism; joint {self.joints[j]} can move along "
                     f"({written}) without force. Add a support."
                 )
         return SpaceFlows(np.asarray(members), np.asarray(supports))

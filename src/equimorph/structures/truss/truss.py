@@ -216,7 +216,7 @@ class Truss(TrussMechanics, Shortening):
         moves[~self.network.held] = mode
         at, direction = direction_of_mechanism(moves)
         raise InputError(
-            f"`truss` must be no mechanism; joint {self.network.joints[at]} can move along "
+            f"`truss` must not be a mechanism; joint {self.network.joints[at]} can move along "
             f"({direction}) without force. Add a bar or a support."
         )
 

@@ -20,7 +20,7 @@ Vector = Float[np.ndarray, " k"]
 @check_arguments
 @dataclass(frozen=True, eq=False)
 class Family(Rebuilt):
-    """Structures that differ in data which are no parameters: a stiffness, a length, a rise.
+    """Structures that differ in data other than parameters: a stiffness, a length, a rise.
 
     Parameters
     ----------

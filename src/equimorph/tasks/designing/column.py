@@ -95,7 +95,7 @@ class StrongestColumn:
 def strongest_column(
     supports: Supports, elements: Annotated[int, count(4, 256)] = 64
 ) -> StrongestColumn:
-    """Area along a column of given volume that carries the largest load, for B = a².
+    """Find the area along a column of given volume that carries the largest load, for B = a².
 
     Of all loads t and areas a with ``K(a) − t M`` positive definite, the largest t is found by a
     primal interior-point method; buckling loads that coincide need no special treatment.

@@ -84,7 +84,7 @@ def design(
     tolerance: float = 1e-5,
     rebuilds: int = 60,
 ) -> Design:
-    """Choose the structure of a family for which a limit load, a route or a state is best.
+    """Choose the structure of a family with the best limit load, route or state.
 
     The values of exact folds, states and passes are followed by the variables, with exact
     gradients; SLSQP moves the worst of them within a trust region. Each design is then judged by a
@@ -224,7 +224,7 @@ def design_front(
     tolerance: float = 1e-5,
     rebuilds: int = 60,
 ) -> DesignFront:
-    """Designs of a family between two objectives, by bounding the second in equal steps.
+    """Trade two objectives of a family off against each other: bound the second in equal steps.
 
     Parameters
     ----------

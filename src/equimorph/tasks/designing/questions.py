@@ -78,7 +78,7 @@ def no_answer(why: str) -> Answer:
 @check_arguments
 @dataclass(frozen=True, eq=False)
 class StateValue:
-    """Value of a descriptor at a stable state whose parameters stay as they are.
+    """Value of a descriptor at a stable state, whose parameters a design keeps.
 
     Parameters
     ----------
@@ -114,7 +114,7 @@ class StateValue:
 @check_arguments
 @dataclass(frozen=True, eq=False)
 class LoadLimit:
-    """Limit load on the path from a state whose parameters stay as they are; made large.
+    """Objective of a design: the limit load on the path from a state, which is maximised.
 
     Parameters
     ----------

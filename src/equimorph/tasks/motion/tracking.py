@@ -32,7 +32,7 @@ CRITICAL = ("critical", "branch point", "index")
 
 @dataclass(frozen=True)
 class Tracking:
-    """A motion along targets of descriptors, or where and why it ends.
+    """A motion that follows targets of descriptors, or where and why it ends.
 
     Parameters
     ----------
@@ -127,7 +127,7 @@ def track(  # the knobs of the public face, all by keyword
     monitor: Sequence[Descriptor] = (),
     beyond: bool = False,
 ) -> Tracking:
-    """Follow targets S*(t) with as many actuators or more, while loads may move.
+    """Follow targets S*(t) of descriptors with at least as many actuators, while loads may move.
 
     ``S_a ȧ = Ṡ* − S_l l̇``, corrected onto the set at every step: an error-controlled continuation
     in pseudo-arclength, first with coarse steps, and again with fine ones before it is accepted.

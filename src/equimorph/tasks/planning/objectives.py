@@ -163,7 +163,7 @@ class Extreme:
 
 @check_arguments
 def peak(descriptor: Descriptor, slack: float = 1e-3) -> Extreme:
-    """Objective of `plan`: the largest value of a descriptor on the way is made as low as possible.
+    """Objective of `plan` that minimises the largest value of a descriptor along the route.
 
     Of all routes that come as low up to the slack, the shortest one is sought.
 
@@ -185,7 +185,7 @@ def peak(descriptor: Descriptor, slack: float = 1e-3) -> Extreme:
 
 @check_arguments
 def least(descriptor: Descriptor, slack: float = 1e-3) -> Extreme:
-    """Objective of `plan`: the least value of a descriptor on the way is made as high as possible.
+    """Objective of `plan` that maximises the least value of a descriptor along the route.
 
     Parameters
     ----------

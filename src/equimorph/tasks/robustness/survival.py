@@ -37,7 +37,7 @@ def survival(
     *,
     within: Sequence[Constraint] = (),
 ) -> Survival:
-    """Whether a schedule is executed without a snap by structures with errors.
+    """Decide whether structures with errors execute a schedule without a snap.
 
     Errors stay constant during the execution; they are there before it begins. A box of errors is
     divided, together with the schedule, into cells for each of which a Newton–Kantorovich bound
@@ -69,7 +69,7 @@ def survival(
 
 @dataclass(frozen=True)
 class SurvivalRoom:
-    """How large errors a schedule survives, as multiples of given ones.
+    """The largest errors that a schedule survives, as multiples of given ones.
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ def survival_room(
     *,
     within: Sequence[Constraint] = (),
 ) -> SurvivalRoom:
-    """Widest box of errors that a schedule survives: shown by bounds, and by bisection of trials.
+    """Find the widest box of errors that a schedule survives, by bounds and by bisected trials.
 
     Parameters
     ----------

@@ -150,7 +150,7 @@ def retime(
     within: Sequence[Constraint] = (),
     margin: float = 0.0,
 ) -> Verification:
-    """Motion along a schedule that its actuators can execute, lifted and judged anew.
+    """Find a motion along a schedule that its actuators can execute, lifted and verified again.
 
     At every instant a parameter moves at its largest rate or is limited by accelerations and jerks;
     without these the motion has constant rates between corners. Sharp corners are met exactly,

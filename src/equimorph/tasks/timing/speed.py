@@ -80,7 +80,7 @@ def speed_limit(
     start: State | None = None,
     structure: Structure | None = None,
 ) -> SpeedLimit:
-    """Largest rate at which a structure stays near the equilibria of a schedule; see the Notes.
+    """Find the largest rate at which a structure stays near the equilibria of a schedule.
 
     Parameters
     ----------
@@ -156,7 +156,7 @@ def deviation_bound(
     start: State | None = None,
     structure: Structure | None = None,
 ) -> tuple[Steps, Steps]:
-    """Times, and the deviation to be expected at each, of a schedule with times.
+    """Times of a schedule, and the deviation from equilibrium to be expected at each.
 
     The bound of `speed_limit`, with its assumptions, in the unit of length.
 

@@ -155,7 +155,7 @@ class BoxProof:
 
 @check_arguments
 def certify_box(state: State, box: Box, *, margin: float = 0.0, most: int = 10_000) -> BoxProof:
-    """Prove, or support, that a sheet of stable states goes on over a whole box of parameters.
+    """Prove, or support, that one sheet of stable states extends over a whole box of parameters.
 
     Then any motion within the box that starts on this sheet stays on it, without a snap. The box is
     bisected, across the parameter that moves the states most, until the bounds, enclosed or sampled

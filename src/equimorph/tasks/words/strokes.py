@@ -35,7 +35,7 @@ def word_graph(
     *,
     within: Sequence[Constraint] = (),
 ) -> WordGraph:
-    """Which words of a multistable structure motions of one parameter at a time lead to.
+    """Find the words of a multistable structure that moving one parameter at a time reaches.
 
     From each state every parameter is moved both ways to the ends of its stroke while the others
     stay as they are at rest; at any place it may turn back. Where stability is lost the structure

@@ -269,7 +269,7 @@ def word_graph_over(
     *,
     samples: int = 9,
 ) -> WordGraph:
-    """Which words of a multistable structure motions of several parameters together lead to.
+    """Find the words of a multistable structure that moving several parameters together reaches.
 
     Within a stable stratum of the set every state leads to every other one without a snap; over
     the folds around it the structure snaps to others (`snap_graph`). So words of the same stratum
