@@ -13,7 +13,7 @@ import numpy as np
 
 import equimorph as em
 from equimorph.dynamics.outcomes import Clock, Launches, Outcome, play
-from equimorph.dynamics.own import OwnModel
+from equimorph.dynamics.own_equations import OwnModel
 from equimorph.structures.vibration import vibrations
 
 MODES, DAMPING, STEP, TOGETHER = 6, 0.05, 0.04, 200

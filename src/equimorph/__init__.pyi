@@ -342,7 +342,7 @@ from .tasks.verification.proof import (
     certify_box as certify_box,
     BoxProof as BoxProof,
 )
-from .tasks.robustness.erring import (
+from .tasks.robustness.error_model import (
     Errors as Errors,
 )
 from .tasks.robustness.survival import (

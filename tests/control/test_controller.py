@@ -8,7 +8,7 @@ import pytest
 
 import equimorph as em
 from equimorph.control.estimate import Measurement, fit_loads
-from equimorph.control.likely import positions
+from equimorph.control.likely_loads import positions
 from oracles.wandering_load import Plant, PlantInMuJoCo, wandering
 from sets import arch_set
 from typecheck import unchecked

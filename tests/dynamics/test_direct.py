@@ -5,7 +5,7 @@ import pytest
 
 import equimorph as em
 from equimorph.dynamics import ReplaySettings, replay
-from equimorph.dynamics.own import Motion, OwnPlant
+from equimorph.dynamics.own_equations import Motion, OwnPlant
 
 ARCH = ({"A": (-1, 0), "B": (0, 0.1), "C": (1, 0)}, [("A", "B"), ("B", "C")])
 HELD = {"A": "xy", "C": "xy"}

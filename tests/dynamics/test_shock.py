@@ -6,12 +6,12 @@ import pytest
 import equimorph as em
 from equimorph.dynamics.model import landing
 from equimorph.dynamics.outcomes import Clock, Launches, Outcome, least_force, play
-from equimorph.dynamics.own import Motion
+from equimorph.dynamics.own_equations import Motion
 from equimorph.dynamics.shock import _Trial
 from equimorph.dynamics.simulators import model_of
 from equimorph.errors import InputError
+from equimorph.structures.added_load import Pushed
 from equimorph.structures.contract import Structure
-from equimorph.structures.pushed import Pushed
 from equimorph.structures.vibration import vibrations
 from equimorph.tolerances import SAME_SOLUTION
 

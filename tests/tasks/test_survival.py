@@ -10,7 +10,7 @@ import equimorph as em
 from equimorph.equilibria import settle
 from equimorph.errors import InputError
 from equimorph.structures import Rod, Spring, State, States
-from equimorph.tasks.robustness.erring import ErringStructure, Errors
+from equimorph.tasks.robustness.error_model import ErringStructure, Errors
 from equimorph.tasks.robustness.evidence import Survival
 from equimorph.tasks.robustness.survival import survival, survival_room
 from equimorph.tasks.robustness.trials import random_trials

@@ -8,7 +8,7 @@ import numpy as np
 from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Flags, Values
 from equimorph.control.estimate import Belief, ControlStatus, Estimate, Measurement, fit_loads
-from equimorph.control.likely import Bundles, LikelyLoads, move_states, positions
+from equimorph.control.likely_loads import Bundles, LikelyLoads, move_states, positions
 from equimorph.control.safe_routes import route_is_safe, safe_route
 from equimorph.control.strides import MovingTarget, Step, Strides, ahead_of, setting_of
 from equimorph.errors import InputError

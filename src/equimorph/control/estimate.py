@@ -13,7 +13,7 @@ import numpy as np
 from scipy.special import chdtrc
 
 from equimorph.arrays import Float, Values
-from equimorph.control.likely import Places, move_states
+from equimorph.control.likely_loads import Places, move_states
 from equimorph.equilibria import Guards, settle
 from equimorph.errors import InputError
 from equimorph.model import Descriptor

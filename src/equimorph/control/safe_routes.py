@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from equimorph.arrays import Int, Values
-from equimorph.control.likely import REACH, Bundles, LikelyLoads, move_states, positions
+from equimorph.control.likely_loads import REACH, Bundles, LikelyLoads, move_states, positions
 from equimorph.equilibria import TraceOptions
 from equimorph.manifold import EquilibriumSet, equilibrium_set
 from equimorph.manifold.complex.kept_sets import from_cache

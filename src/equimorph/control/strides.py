@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from equimorph.arrays import Float, Values
-from equimorph.control.likely import Bundles, LikelyLoads, Places, move_states
+from equimorph.control.likely_loads import Bundles, LikelyLoads, Places, move_states
 from equimorph.model import Box, Descriptor
 from equimorph.structures import State, States, join_states
 from equimorph.tasks.motion.course import correct_onto_targets

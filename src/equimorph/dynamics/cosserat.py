@@ -17,7 +17,7 @@ from equimorph.dynamics.rods import ChainedRod, stiffness_and_rest
 from equimorph.errors import InputError
 from equimorph.optional_packages import load_package
 from equimorph.structures import Rod, State, States
-from equimorph.structures.rod.rod_description import construction
+from equimorph.structures.rod.any_description import construction
 
 RADIUS = 0.005
 """Radius of the round section relative to the length; EA is then 4/r² times B."""

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from equimorph.arrays import Float
-from equimorph.dynamics.chained import PlanarChained
+from equimorph.dynamics.chain_entries import PlanarChained
 from equimorph.dynamics.linkage import Bends, Linkage, Supports
 from equimorph.dynamics.mechanism import Vector
 from equimorph.errors import MissingError

@@ -6,7 +6,7 @@ import numpy as np
 
 from equimorph.arrays import Float
 from equimorph.dynamics.balance import Balance, Quasistatics, balance, follow
-from equimorph.dynamics.chained import Chained
+from equimorph.dynamics.chain_entries import Chained
 from equimorph.dynamics.fold_delay import fold_delay
 from equimorph.dynamics.mechanism import Pulls, Settings, Vector
 from equimorph.dynamics.model import Course, Model, Motion, Plant, Points, Row

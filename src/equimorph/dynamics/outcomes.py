@@ -7,13 +7,13 @@ import numpy as np
 
 from equimorph.arrays import Flags, Int, Lanes, Parameters, Values, Velocity
 from equimorph.columns import Columns
-from equimorph.dynamics.own import Motion
+from equimorph.dynamics.own_equations import Motion
 from equimorph.equilibria import EnergyBarrier, lift, snap_landing
 from equimorph.equilibria.gradient_flow import Ending, gradient_flow
 from equimorph.equilibria.soft_modes import extent_of_guesses, metric_length, soft_modes
 from equimorph.model import Descriptor
 from equimorph.structures import State, States, Structure
-from equimorph.structures.pushed import PUSH, Pushed
+from equimorph.structures.added_load import PUSH, Pushed
 from equimorph.tolerances import SAME_SOLUTION
 
 LARGEST_PUSH = 20.0

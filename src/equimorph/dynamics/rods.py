@@ -7,7 +7,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from equimorph.arrays import Float
-from equimorph.dynamics.chained import PlanarChained
+from equimorph.dynamics.chain_entries import PlanarChained
 from equimorph.dynamics.linkage import Bends, Linkage, Supports
 from equimorph.dynamics.mechanism import Vector
 from equimorph.errors import MissingError
@@ -23,10 +23,10 @@ from equimorph.structures import (
     States,
     Tendon,
 )
+from equimorph.structures.rod.any_description import Construction, construction
 from equimorph.structures.rod.ends import FREE, HELD, Holding, support_axes
 from equimorph.structures.rod.model import Build
 from equimorph.structures.rod.profiles import LoadShape
-from equimorph.structures.rod.rod_description import Construction, construction
 from equimorph.structures.rod.terms import Term
 from equimorph.structures.rod.units import FOUR_PI_SQUARED
 from equimorph.structures.spatial.model import direction_in_space

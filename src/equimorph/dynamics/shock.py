@@ -12,7 +12,7 @@ import numpy as np
 from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Flags, Float, Values
 from equimorph.dynamics.outcomes import Clock, Launches, Outcome, least_force, play, relax
-from equimorph.dynamics.own import Motion, OwnModel
+from equimorph.dynamics.own_equations import Motion, OwnModel
 from equimorph.dynamics.replay import ReplaySettings
 from equimorph.equilibria import EnergyBarrier, TransitionNetwork, lift, transition_network
 from equimorph.equilibria.gradient_flow import implicit_step
@@ -20,7 +20,7 @@ from equimorph.equilibria.lift import check_start
 from equimorph.errors import InputError
 from equimorph.model import Descriptor, Parameter, parameter_vector
 from equimorph.structures import State, States
-from equimorph.structures.pushed import Pushed
+from equimorph.structures.added_load import Pushed
 from equimorph.structures.vibration import vibrations
 
 TRIED = 12

@@ -5,7 +5,7 @@ from equimorph.dynamics.direct import TrussModel
 from equimorph.dynamics.frames import ChainedFrame
 from equimorph.dynamics.linkage_model import LinkageModel
 from equimorph.dynamics.model import Model
-from equimorph.dynamics.own import OwnModel
+from equimorph.dynamics.own_equations import OwnModel
 from equimorph.dynamics.plant import mujoco_module
 from equimorph.dynamics.rods import ChainedRod
 from equimorph.dynamics.spatial_rods import ChainedSpatialRod, check_isolated

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from equimorph.arrays import Float, Int
-from equimorph.dynamics.chained import Chained
+from equimorph.dynamics.chain_entries import Chained
 from equimorph.dynamics.mechanism import LIGHT, Settings, Vector
 from equimorph.dynamics.plant import Simulation
 from equimorph.dynamics.rods import (
@@ -34,7 +34,7 @@ from equimorph.dynamics.spatial_chain import (
 from equimorph.dynamics.writer import closing, document, inertial
 from equimorph.errors import InputError
 from equimorph.structures import Curvature, SpatialRod, State, States, Tendon
-from equimorph.structures.rod.rod_description import Construction, construction
+from equimorph.structures.rod.any_description import Construction, construction
 from equimorph.structures.rod.terms import Term
 from equimorph.structures.rod.units import FOUR_PI_SQUARED
 from equimorph.structures.spatial.ends import support_axes

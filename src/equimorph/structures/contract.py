@@ -27,7 +27,7 @@ from equimorph.model import (
     parameter_vector,
     remember_call,
 )
-from equimorph.structures.approach import straight_arcs
+from equimorph.structures.clearance import straight_arcs
 from equimorph.structures.equations import Equations
 from equimorph.tables import html_table
 

@@ -25,7 +25,7 @@ from equimorph.study.lookup import (
 from equimorph.study.states import StateSection
 from equimorph.tasks.maps.actuator_map import unloaded_base
 from equimorph.tasks.planning.objectives import least, peak
-from equimorph.tasks.robustness.erring import ErringStructure, Errors
+from equimorph.tasks.robustness.error_model import ErringStructure, Errors
 from equimorph.tasks.start import check_schedule
 from equimorph.tasks.verification.schedule_check import first_state
 

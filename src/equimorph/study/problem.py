@@ -18,9 +18,9 @@ from equimorph.argument_checks import check_arguments
 from equimorph.errors import InputError
 from equimorph.study.complaint import complaint, cut
 from equimorph.study.data_files import FOLDER
-from equimorph.study.extent import PointSection, SetSection
 from equimorph.study.fields import Section, requirement
 from equimorph.study.kinds import KINDS
+from equimorph.study.set_section import PointSection, SetSection
 from equimorph.study.structures import ANY_STRUCTURE, StructureSection
 
 _PLACE = re.compile(r"(.*) \(at line (\d+), column (\d+)\)")

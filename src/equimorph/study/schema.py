@@ -11,12 +11,12 @@ from collections.abc import Mapping
 from typing import Any
 
 from equimorph.structures import KINDS as STRUCTURES
-from equimorph.study.extent import PointSection, SetSection
 from equimorph.study.fields import Section
 from equimorph.study.kinds import KINDS
 from equimorph.study.lookup import RuleSection
 from equimorph.study.problem import STUDY
 from equimorph.study.reference import meanings, meanings_of_kind, meanings_of_set
+from equimorph.study.set_section import PointSection, SetSection
 from equimorph.study.states import NaturalSection, StateSection
 from equimorph.study.structures import (
     PARTS,

@@ -43,7 +43,7 @@ from equimorph.study.fields import (
 )
 from equimorph.study.lookup import RuleSection
 from equimorph.study.states import NaturalSection, StateSection
-from equimorph.tasks.robustness.erring import Errors
+from equimorph.tasks.robustness.error_model import Errors
 
 MEANINGS: Mapping[str, Any] = {
     "margin": NotNegative,

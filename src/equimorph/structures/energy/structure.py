@@ -15,7 +15,7 @@ from equimorph.linalg.sparse import SparseLayout
 from equimorph.model import Constraint, Descriptor, Drawing, position, remember_call
 from equimorph.structures.contract import Growth
 from equimorph.structures.discrete import DiscreteStructure, along_corners
-from equimorph.structures.energy.declared import (
+from equimorph.structures.energy.declarations import (
     Formula,
     Formulas,
     ParameterSpec,

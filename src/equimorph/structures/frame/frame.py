@@ -17,7 +17,7 @@ from equimorph.structures.frame.images import PlanarImage, find_images
 from equimorph.structures.frame.model import FrameModel
 from equimorph.structures.frame.network import AXES, MemberSpec, SupportSpec, frame_network
 from equimorph.structures.network import Joints
-from equimorph.structures.stressed import Stressed
+from equimorph.structures.stress import Stressed
 from equimorph.structures.unit_system import Units, unit_system
 
 

@@ -9,9 +9,9 @@ import numpy as np
 
 from equimorph.errors import InputError
 from equimorph.model import Parameter
+from equimorph.structures.rod.any_description import RodDescription, check_profile_positive
 from equimorph.structures.rod.ends import HELD, End, check_supports, end, support_axes
 from equimorph.structures.rod.model import Build, RodModel, raw_model, raw_names
-from equimorph.structures.rod.rod_description import RodDescription, check_profile_positive
 from equimorph.structures.rod.terms import Pressure
 
 SIDES = (attrgetter("first"), attrgetter("last"))

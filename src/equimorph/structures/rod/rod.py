@@ -13,8 +13,8 @@ from equimorph.model import Drawing, Parameter
 from equimorph.structures.contract import Growth
 from equimorph.structures.rod.any_rod import AnyRod
 from equimorph.structures.rod.clamped import ClampedMechanics
-from equimorph.structures.rod.described import Described
 from equimorph.structures.rod.description import PlanarDescription
+from equimorph.structures.rod.descriptors import Described
 from equimorph.structures.rod.discretisation import ElementCount, mesh_with_kinks
 from equimorph.structures.rod.drawing import ENDS, Amplitudes, rod_drawing, rod_supports
 from equimorph.structures.rod.ends import End, EndSpec

@@ -9,7 +9,7 @@ from equimorph.arrays import Float, Lanes, Parameters, Values
 from equimorph.errors import InputError
 from equimorph.model import Descriptor, Vanishing
 from equimorph.structures.rod.lateral import Coefficients, Movements, OutOfPlane
-from equimorph.structures.rod.measured import Measured
+from equimorph.structures.rod.planar_fields import Measured
 from equimorph.structures.rod.terms import Couple, Pressure, Term
 
 Points = Float[np.ndarray, "lanes elements order"]

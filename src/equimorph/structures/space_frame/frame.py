@@ -22,7 +22,7 @@ from equimorph.structures.space_frame.mechanics import SpatialFrameMechanics
 from equimorph.structures.space_frame.member import SpatialMemberSpec, SpatialSupportSpec
 from equimorph.structures.space_frame.model import SpatialFrameModel
 from equimorph.structures.space_frame.network import spatial_network
-from equimorph.structures.stressed import Stressed
+from equimorph.structures.stress import Stressed
 from equimorph.structures.unit_system import Units, unit_system
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from equimorph.errors import InputError
 from equimorph.model import Parameter
-from equimorph.structures.rod.rod_description import RodDescription, check_profile_positive
+from equimorph.structures.rod.any_description import RodDescription, check_profile_positive
 from equimorph.structures.rod.terms import Term
 from equimorph.structures.spatial.ends import (
     PLACES,

@@ -10,8 +10,8 @@ import numpy as np
 
 from equimorph.arrays import Bool, Flags, Float, Lanes, Parameters, Values
 from equimorph.errors import InputError
-from equimorph.structures.rod.measured import Measured
 from equimorph.structures.rod.natural import Outcome, continue_ends
+from equimorph.structures.rod.planar_fields import Measured
 from equimorph.structures.spatial.ends import PLACES
 from equimorph.structures.spatial.mechanics import SpatialMechanics
 from equimorph.structures.spatial.model import ANGLES

@@ -18,8 +18,8 @@ from equimorph.structures.rod.profiles import LoadSpec, MeasuredProfile, Profile
 from equimorph.structures.rod.sections import CrossSection
 from equimorph.structures.rod.space_options import SpaceOptions
 from equimorph.structures.rod.terms import LineLoad, Term, Terms
-from equimorph.structures.spatial.described import DescribedInSpace
 from equimorph.structures.spatial.description import SpatialDescription
+from equimorph.structures.spatial.descriptors import DescribedInSpace
 from equimorph.structures.spatial.ends import Ends
 from equimorph.structures.spatial.fields import SpatialFields
 from equimorph.structures.spatial.mechanics import SpatialMechanics

@@ -23,7 +23,7 @@ from equimorph.tasks.planning.objectives import Extreme, Wish, least
 from equimorph.tasks.planning.refusals import free_or_over_a_pass
 from equimorph.tasks.planning.snap_routes import route_with_snaps
 from equimorph.tasks.planning.straightening import check_ends, verify_way_points, violation
-from equimorph.tasks.robustness.erring import Errors
+from equimorph.tasks.robustness.error_model import Errors
 from equimorph.tasks.robustness.evidence import Survival
 from equimorph.tasks.robustness.survival import rest_survives, survival, trial_room
 from equimorph.tasks.route import Corners, Route, refusal

@@ -7,7 +7,7 @@ import numpy as np
 from scipy.special import betaincinv
 
 from equimorph.arrays import Float, Shaped
-from equimorph.tasks.robustness.erring import Errors, Offsets
+from equimorph.tasks.robustness.error_model import Errors, Offsets
 from equimorph.tasks.verification.tube import TubeProof
 
 CONFIDENCE = 0.95

@@ -11,7 +11,7 @@ from equimorph.equilibria import check_start
 from equimorph.errors import InputError
 from equimorph.model import Constraint, Schedule, names_of
 from equimorph.structures import State
-from equimorph.tasks.robustness.erring import ErringStructure, Errors, Offsets, errors_of
+from equimorph.tasks.robustness.error_model import ErringStructure, Errors, Offsets, errors_of
 from equimorph.tasks.robustness.evidence import Status, Survival
 from equimorph.tasks.robustness.room import error_directions
 from equimorph.tasks.robustness.trials import Execution, TrialEnds, corner_rows

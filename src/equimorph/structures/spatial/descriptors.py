@@ -15,7 +15,7 @@ from equimorph.structures.rod.any_rod import Arclengths, Field, Peaks, arclength
 from equimorph.structures.rod.centreline import Centreline
 from equimorph.structures.rod.extrema import peaks, stations
 from equimorph.structures.rod.fibres import Sizes, Strains
-from equimorph.structures.rod.measured import StressedRod
+from equimorph.structures.rod.planar_fields import StressedRod
 from equimorph.structures.spatial.fields import Fields, SpatialFields
 from equimorph.structures.spatial.mechanics import SpatialMechanics
 from equimorph.structures.spatial.orbits import on_orbit

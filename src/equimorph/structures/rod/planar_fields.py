@@ -13,13 +13,13 @@ import numpy as np
 from equimorph.arrays import Float, Lanes, Parameters, Values, Velocity
 from equimorph.errors import MissingError
 from equimorph.structures.contract import Readers, Written
+from equimorph.structures.rod.any_description import RodDescription
 from equimorph.structures.rod.any_rod import AnyRod, Arclengths
 from equimorph.structures.rod.centreline import Centreline
 from equimorph.structures.rod.fibres import Fibres
 from equimorph.structures.rod.mechanics import PlanarMechanics
-from equimorph.structures.rod.rod_description import RodDescription
 from equimorph.structures.rod.terms import Curvature
-from equimorph.structures.stressed import Stressed
+from equimorph.structures.stress import Stressed
 from equimorph.structures.unit_system import UnitSystem
 
 FREE = ("stiffness", "curvature", "side_curvature", "natural_twist")

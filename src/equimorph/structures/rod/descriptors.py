@@ -17,8 +17,8 @@ from equimorph.structures.rod.any_rod import Field, Peaks
 from equimorph.structures.rod.ends import End
 from equimorph.structures.rod.extrema import extreme_curvatures, peaks, stations
 from equimorph.structures.rod.lateral import Holding, LateralStiffness, OutOfPlane
-from equimorph.structures.rod.measured import Measured, StressedRod
 from equimorph.structures.rod.model import RodModel
+from equimorph.structures.rod.planar_fields import Measured, StressedRod
 from equimorph.structures.rod.space import LateralMode
 from equimorph.structures.rod.space_options import SpaceOptions
 from equimorph.structures.states import State

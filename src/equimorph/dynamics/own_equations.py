@@ -11,7 +11,7 @@ from equimorph.dynamics.direct import DirectModel, DirectPlant
 from equimorph.dynamics.model import Plant, Row
 from equimorph.equilibria.soft_modes import metric_length
 from equimorph.structures import State, Structure
-from equimorph.structures.pushed import dense_matrices
+from equimorph.structures.added_load import dense_matrices
 
 NEWTON_STEPS = 25
 CONVERGED = 1e-9
