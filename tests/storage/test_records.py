@@ -6,6 +6,7 @@ import pytest
 
 import equimorph as em
 from equimorph.storage.owner import Owner
+from equimorph.storage.records import content_of, load_record
 from equimorph.storage.values import read_value, write_value
 from equimorph.structures.quantities import find_descriptor
 from same_records import assert_equal
@@ -102,3 +103,14 @@ def test_descriptors_by_name(spring, text):
 def test_names_that_mean_nothing(spring, text, problem):
     with pytest.raises(em.InputError, match=problem):
         find_descriptor(spring, text)
+
+
+def test_a_descriptor_of_the_caller_is_found_by_its_name(tmp_path, eset, spring):
+    """Files hold names: the reader gives the descriptors that are its own."""
+    steep = em.Descriptor("steep", "1", lambda z, p: np.tan(z[:, 0]), "s", spring.signature)
+    targets = {spring.descriptor("angle"): 0.4, em.value_of(spring, "F"): 0.01}
+    found, file = em.solve_shape(eset, targets, within=[steep <= 0.5]), tmp_path / "shapes.h5"
+    file.write_bytes(content_of(found))
+    assert_equal(load_record(file, spring, {"steep": steep}), found)
+    with pytest.raises(em.InputError, match="steep"):
+        load_record(file, spring)
