@@ -19,7 +19,7 @@ import equimorph as em
 from equimorph.linalg.compile_ahead import LIST
 
 PACKAGE = Path(em.__file__).parent
-OF_SETS = ("equimorph.equilibria.", "equimorph.manifold.")
+OF_SETS = ("equimorph.equilibria.", "equimorph.manifold.", "equimorph.marching.")
 ARRAY = re.compile(r"Array\((\w+), (\d), 'C', False, aligned=True\)")
 
 

@@ -7,8 +7,8 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 
 from equimorph.arrays import Float, Lanes, Numbers, Parameters, Some, Values
-from equimorph.equilibria.kernels import squared_lengths
 from equimorph.linalg import Border, BorderedSolution
+from equimorph.marching.kernels import squared_lengths
 from equimorph.structures import Advance, Direction, Equations, LinearSystem, Structure
 from equimorph.structures.equations import advance_by
 

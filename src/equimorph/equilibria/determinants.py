@@ -7,9 +7,9 @@ import numpy as np
 
 from equimorph.arrays import Bool, Float, Lanes, Parameters, Some
 from equimorph.equilibria.curves import Curve, ParameterLine
-from equimorph.equilibria.kernels import EARLY_DIP, EARLY_NEAR
 from equimorph.equilibria.locate import hermite
 from equimorph.equilibria.steps import Bracket
+from equimorph.marching.kernels import EARLY_DIP, EARLY_NEAR
 from equimorph.structures import Structure
 
 Values = Float[np.ndarray, " points"]

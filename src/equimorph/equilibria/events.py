@@ -111,4 +111,4 @@ def _locate(
         z, p = here.take(some).states(z, t)
         return worst_excess(constraints, z, p)
 
-    return locate_root(here, bracket, worst)
+    return locate_root(here, bracket, worst, constraints)

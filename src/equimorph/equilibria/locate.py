@@ -13,15 +13,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from equimorph.arrays import Flags, Float, Lanes, Parameters, Some, Values
-from equimorph.equilibria import event_kernels as roots, kernels
+from equimorph.equilibria.compiled import Line, Workspace, compiled_steps
 from equimorph.equilibria.critical import Critical, normal_form, null_border
 from equimorph.equilibria.curves import AlongCurve, Curve, along_parameters, dual, squared_length
-from equimorph.equilibria.kernels import cubic_shares
 from equimorph.equilibria.newton_step import Planes
 from equimorph.equilibria.point_conditions import Crossing
 from equimorph.equilibria.settle import Guards, Settled, settle
 from equimorph.equilibria.steps import Bracket, Front, new_scalars
+from equimorph.linalg.simd import LANES
+from equimorph.marching import event_kernels as roots, kernels, tick_kernels as ticks
+from equimorph.marching.kernels import cubic_shares
+from equimorph.model import Constraint
 from equimorph.structures import Advance
+from equimorph.structures.compiled_steps import CompiledSteps
 
 AT_ROUND_OFF = Guards(iterations=24, converged=1e-9)
 """A point is exact after a correction below 1e-9 in the metric: Newton squares the error."""
@@ -108,7 +112,7 @@ def locate_fold(curve: Curve, bracket: Bracket) -> Located:
     bend, bow = 3 * rise - 2 * a - b, a + b - 2 * rise
     under = np.maximum(bend**2 - 3 * bow * a, 0.0)
     share = np.clip(a / (-bend + np.sign(a) * np.sqrt(under)), 1e-3, 1.0 - 1e-3)
-    return root_inside(curve, bracket, lambda _, front: front.tangent_t, (a, b), share)
+    return root_inside(curve, bracket, lambda _, front: front.tangent_t, (a, b), share, ())
 
 
 def locate_branch_point(curve: Curve, bracket: Bracket) -> Located:
@@ -157,11 +161,15 @@ def _arclength(curve: Curve, bracket: Bracket, z: Lanes, t: Values, share: Value
 
 
 def locate_root(
-    curve: Curve, bracket: Bracket, function: Callable[[Some, Lanes, Values], Values]
+    curve: Curve,
+    bracket: Bracket,
+    function: Callable[[Some, Lanes, Values], Values],
+    constraints: tuple[Constraint, ...] | None = None,
 ) -> Located:
     """Zero of a scalar of the state that changes sign over the step.
 
-    `function` gets the numbers of lanes, z and t.
+    `function` gets the numbers of lanes, z and t; `constraints` are those whose largest excess it
+    is, if it is one.
     """
     everyone = np.arange(len(bracket.lanes))
     # a start on the bound may exceed it by round-off: then it is itself the root
@@ -172,7 +180,7 @@ def locate_root(
     def scalar(some: Some, front: Front) -> Values:
         return function(some, front.z, front.t)
 
-    return root_inside(curve, bracket, scalar, (low, high), share)
+    return root_inside(curve, bracket, scalar, (low, high), share, constraints or None)
 
 
 def locate_critical(curve: Curve, bracket: Bracket) -> Located:
@@ -199,7 +207,12 @@ VALUE = 1e-13
 
 
 def root_inside(
-    curve: Curve, bracket: Bracket, scalar: Scalar, ends: tuple[Values, Values], guess: Values
+    curve: Curve,
+    bracket: Bracket,
+    scalar: Scalar,
+    ends: tuple[Values, Values],
+    guess: Values,
+    constraints: tuple[Constraint, ...] | None = None,
 ) -> Located:
     """Zero of a scalar with values of opposite signs at the ends of a step.
 
@@ -211,8 +224,13 @@ def root_inside(
         Values at both ends of the step; a zero at the start is the root.
     guess
         Share of the step that is tried first.
+    constraints
+        Those whose largest excess is the scalar; none of them, if it is dt/ds.
     """
     search = _Search(curve, bracket, ends, guess)
+    compiled = None if constraints is None else compiled_steps(curve, search.root.z, constraints)
+    if compiled:
+        search.run(*compiled)
     while search.active:
         search.round(scalar)
     return search.root
@@ -225,12 +243,13 @@ class _Search:
         self, curve: Curve, bracket: Bracket, ends: tuple[Values, Values], guess: Values
     ) -> None:
         lanes, (old, new) = len(guess), (bracket.before, bracket.after)
-        self.curve, self.active = curve, lanes
-        ends_of_steps = (old.z, new.z, new.tangent_z, old.z, old.tangent_z)
-        work = (np.empty_like(old.z), np.empty_like(old.z))
-        self._places = (*(each.copy() for each in ends_of_steps), *work)
-        self._scalars, self._ends = new_scalars(lanes), np.empty((roots.ENDS, lanes))
-        self._scalars[1][kernels.LANE] = np.arange(lanes)
+        self.curve, self.active, rows = curve, lanes, max(lanes, LANES)
+        self._places = tuple(np.empty((rows, old.z.shape[1])) for _ in range(7))
+        given = (old.z, new.z, new.tangent_z, old.z, old.tangent_z)
+        for place, each in zip(self._places, given, strict=False):
+            place[:lanes] = each
+        self._scalars, self._ends = new_scalars(rows), np.zeros((roots.ENDS, rows))
+        self._scalars[1][kernels.LANE, :lanes] = np.arange(lanes)
         for row_number, column in (
             (roots.X1, bracket.step), (roots.F1, ends[1]), (roots.T1, new.t),
             (roots.SLOPE1, new.tangent_t), (roots.X2, 0.0), (roots.F2, ends[0]),
@@ -238,12 +257,27 @@ class _Search:
             (roots.SHARE, 1.0 - guess),
             (roots.SMALL, VALUE * (np.abs(ends[0]) + np.abs(ends[1]))),
         ):  # fmt: skip
-            self._ends[row_number] = column
+            self._ends[row_number, :lanes] = column
         self.root = Located(old.z.copy(), np.empty(lanes), np.empty(lanes), np.zeros(lanes, bool))
         mass = curve.metric.mass
         roots.begin(curve.weight, mass, self._places, *self._scalars, self._ends, lanes)
         self._here = curve
         self._close()
+
+    def run(self, steps: CompiledSteps, line: Line) -> None:
+        """All rounds in the structure's loop."""
+        (numbers, counts), root, rows = self._scalars, self.root, len(self._places[0])
+        trial, row = self._places[5:]
+        space = Workspace(rows, root.z.shape[1], line[0].shape[1], len(steps.bounds))
+        state = np.array([ticks.STEP, self.active])
+        problem = (line, self.curve.metric.mass, steps.guard)
+        block = (self._places, numbers, counts, self._ends, state)
+        found = (root.z, root.t, root.step, root.found)
+        given = (problem, block, space.columns, space.scratch, np.empty(rows), found)
+        while steps.search(steps.tables, steps.bounds, *given) == ticks.UNSAFE:
+            lanes = counts[kernels.LANE, : state[ticks.ACTIVE]]
+            space.step_again(self.curve, trial, row, numbers, lanes, steps.guard)
+        self.active = 0
 
     def round(self, scalar: Scalar) -> None:
         """One Newton step of every lane, and all that follows from it."""

@@ -3,51 +3,33 @@
 See docs/decisions.md, "Lanes march in compiled kernels".
 """
 
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
-from equimorph.arrays import Flags, Float, Lanes, Numbers, Some, Values
-from equimorph.equilibria import kernels, step_kernels as stepping
+from equimorph.arrays import Lanes, Numbers, Some
+from equimorph.equilibria.compiled import Line, Workspace, compiled_steps
 from equimorph.equilibria.curves import Curve, squared_length
-from equimorph.equilibria.events import Events, events_at
-from equimorph.equilibria.inside_steps import NARROW, Span, inside_spans
-from equimorph.equilibria.kernels import (
-    ARRIVAL,
-    BRANCH,
-    CONSTRAINT,
-    CONVERGED,
-    EARLY,
-    ENDED,
-    ENDING,
-    HIDDEN,
-    REFUSED,
-    RETURN,
-)
-from equimorph.equilibria.legs import ON_BOUND
-from equimorph.equilibria.locate import locate_branch_point, polish
-from equimorph.equilibria.steps import (
-    Bracket,
-    EventFile,
-    Front,
-    PointFile,
-    least_inside,
-    new_scalars,
-)
-from equimorph.equilibria.trace_options import EventCode, TraceOptions
+from equimorph.equilibria.events import Events
+from equimorph.equilibria.locate import polish
+from equimorph.equilibria.rare_steps import RareSteps
+from equimorph.equilibria.rows import Rows
+from equimorph.equilibria.steps import Front
+from equimorph.equilibria.trace_options import TraceOptions
+from equimorph.errors import InputError
+from equimorph.marching import kernels, tick_kernels as ticks
+from equimorph.marching.kernels import ARRIVAL, CONVERGED, ENDED, RETURN, STARTING
 from equimorph.model import Constraint
-from equimorph.structures import Advance
-from equimorph.tolerances import METRIC_DIFFERENCE
+from equimorph.structures.compiled_steps import CompiledSteps
 
-Names = Numbers
-
-MISS = 0.1
-"""Error of the largest value of a cubic inside a step, as a share of its rise above the ends."""
 AT_GOAL, FROM_GOAL = 1e-9, 1e-6
 """Distance from an end of t, and of the states in the metric, from which Newton's method takes
 lanes there whose steps became too small."""
 PATIENCE = 40
 """Reciprocal share of finished lanes at which the gaps that they leave in the block are closed."""
+IN_CACHE = 128
+"""Most lanes in a loop that is compiled as a whole: they stay in the cache of a processor."""
 WHY = {
     kernels.SHORT: "the step became too small",
     kernels.LONG: "no end in {most} steps",
@@ -67,312 +49,204 @@ class Loss:
 
 
 class Block:
-    """Lanes that march independently; finished ones make room for waiting ones.
+    """Lanes that march independently; waiting ones take the places of finished ones.
 
-    Every round asks the structure for one Newton step of all lanes; the kernels then take each lane
+    In every tick the structure takes one Newton step of all lanes; the kernels then take each lane
     on: to its next correction, or over an accepted step to the prediction of the next. So no lane
-    ever waits for another, and its result never depends on other lanes.
+    ever waits for another, and its result never depends on other lanes. Where the structure offers
+    `CompiledSteps`, many ticks are one call.
 
     Parameters
     ----------
-    curve
-        Curves of all lanes that may be admitted.
+    curve, z
+        Curves of all lanes that may be admitted, and their starts.
     capacity
         Most lanes that march together.
     events
-        Events that may wait until they are taken out of `events`.
+        Events that may wait until they are taken out of `rows.events`.
     """
 
     def __init__(
         self,
         curve: Curve,
+        z: Lanes,
         constraints: tuple[Constraint, ...],
         options: TraceOptions,
         capacity: int,
         events: int,
     ) -> None:
+        if z.shape[1] != curve.metric.size:  # kernels do not check what they read
+            raise InputError(
+                f"`z` must have {curve.metric.size} columns; got {z.shape[1]}. States belong to "
+                "the structure, and the resolution, that made them."
+            )
         self.curve, self.constraints, self.options = curve, constraints, options
-        self.capacity, self.active = capacity, 0
-        size = curve.metric.size
-        self.events = EventFile(size, events + capacity)
-        self.hidden: list[Events] = []
-        self._last: dict[int, float] = {}
-        self.points = PointFile(size, capacity if options.record else 0)
-        shapes = (2 * [(capacity, stepping.MEMORY, size)]) + (2 * [(capacity, size)])
-        self._places = tuple(np.zeros(shape) for shape in shapes)
-        self._flat = tuple(place.reshape(capacity, -1) for place in self._places)
-        self._scalars = new_scalars(_apart(capacity))
-        self._excess = np.zeros((2 * len(constraints), capacity))
-        self._here = curve.take(np.zeros(0, int))
-        self._knobs = options.table()
+        self._start, self._weight = np.ascontiguousarray(z), curve.weight
+        compiled = compiled_steps(curve, z, constraints)
+        capacity = min(capacity, IN_CACHE) if compiled else capacity
+        self.rows = Rows(capacity, curve.metric.size, len(constraints), events, options)
+        self.rare = RareSteps(curve, constraints, options, self.rows)
+        self._most_events, none = events, np.zeros(0, np.int64)
+        self._waiting, self._knobs, self._here = (none, none), options.table(), curve.take(none)
+        self._rules = (
+            options.smallest_step, options.locates_branch_points, curve.folds_change_index,
+            options.stops, options.record,
+        )  # fmt: skip
+        width = len(curve.structure.parameters)
+        self._workspace = Workspace(self.rows.capacity, curve.metric.size, width, len(constraints))
+        self._loop = self._loop_of(*compiled) if compiled else None
 
     @property
-    def room(self) -> int:
-        """How many more lanes fit."""
-        return self.capacity - self.active
+    def wanted(self) -> int:
+        """How many more lanes it takes; none until a share of the rows is free."""
+        rows, waits = self.rows, self._waits
+        room = rows.capacity - rows.active
+        if waits or (rows.active and ticks.ENOUGH * room < rows.capacity):
+            return 0
+        return room if self._loop is None else room + rows.capacity
 
     @property
-    def lanes(self) -> Names:
-        """Numbers of the lanes on their way."""
-        return np.asarray(self._scalars[1][kernels.LANE, : self.active])
+    def _waits(self) -> int:
+        return len(self._waiting[0]) - int(self.rows.state[ticks.WAITING])
 
-    def admit(self, lanes: Some, z: Lanes, levels: Some) -> list[Loss]:
-        """Start lanes at t = 0; singular starts are lost at once. `levels` counts their retries."""
-        here, count = self.curve.take(lanes), len(lanes)
-        none = np.zeros(count)
-        move = here.advance(z, none, np.zeros_like(z), np.ones(count), none)
-        start = (move.dz, move.tangent_z, move.tangent_t, move.index, move.determinant)
-        state = (self.curve.metric.mass, here.weight, self._places, *self._scalars, self.active)
-        new = slice(self.active, self.active + count)
-        for k, constraint in enumerate(self.constraints):
-            self._excess[2 * k, new] = np.nan
-            self._excess[2 * k + 1, new] = constraint.excess(*here.states(z, none))
-        for lane in lanes if self._last else ():
-            self._last.pop(int(lane), None)
-        stuck = stepping.seat(lanes, levels, self._knobs, z, start, *state)
-        self.active += count
-        lost = self._lost_lanes() if stuck else []
+    @property
+    def busy(self) -> bool:
+        """Whether any lane is on its way or waits."""
+        return self.rows.active > 0 or self._waits > 0
+
+    def admit(self, lanes: Some, levels: Some) -> None:
+        """Let lanes start at t = 0, as soon as there is room. `levels` counts their retries."""
+        assert self._waits == 0
+        self._waiting, self.rows.state[ticks.WAITING] = (lanes, levels), 0
+        self.rare.forget(lanes)
+
+    def drop(self, lanes: Some) -> None:
+        """Take lanes out."""
+        self.rows.stage[np.isin(self.rows.lanes, lanes)] = ENDED
         self._close()
+
+    def run(self, more: bool) -> list[Loss]:
+        """One tick of every lane, or many; lanes that are lost. `more`: whether others may come."""
+        self.rows.points.make_room()
+        return self._tick() if self._loop is None else self._march(self._loop, more)
+
+    # --- ticks that are compiled as a whole -----------------------------------------------------
+
+    def _loop_of(self, steps: CompiledSteps, line: Line) -> Callable[[bool], int]:
+        """The structure's loop with all that stays the same from call to call."""
+        rows, space = self.rows, self._workspace
+        mass, guard = self.curve.metric.mass, steps.guard
+        problem = (line, self._weight, mass, self._knobs, self._start, guard)
+        block = (
+            rows.places, rows.flat, rows.numbers, rows.counts, rows.values, rows.grazing, rows.state
+        )  # fmt: skip
+
+        def march(more: bool) -> int:
+            queue = (*self._waiting, self._most_events, more)
+            files = rows.events.buffer, rows.points.buffer
+            given = (problem, queue, block, space.columns, files, space.scratch, self._rules)
+            why = steps.march(steps.tables, steps.bounds, *given)
+            if why == ticks.UNSAFE:
+                around = rows.places[2], rows.places[3], rows.numbers, rows.lanes
+                space.step_again(self.curve, *around, guard)
+            return why
+
+        return march
+
+    def _march(self, loop: Callable[[bool], int], more: bool) -> list[Loss]:
+        """Ticks until nothing is left to do, files are full, or more lanes are wanted."""
+        lost: list[Loss] = []
+        while (why := loop(more)) != ticks.IDLE:
+            if why == ticks.RARE:
+                self.rare.judge(self._workspace.move)
+            elif why == ticks.LOST:
+                lost += self._lost_lanes()
         return lost
 
-    def tick(self) -> list[Loss]:
-        """One Newton step of every lane, and all that follows from it; lanes that are lost."""
-        active, (numbers, counts) = self.active, self._scalars
-        _, _, trial, row = self._places
-        closing = numbers[kernels.CORNER, :active], numbers[kernels.DEFECT, :active]
-        t = numbers[kernels.TRIAL, :active]
-        move = self._here.advance(trial[:active], t, row[:active], *closing)
+    # --- ticks of any structure -----------------------------------------------------------------
+
+    def _tick(self) -> list[Loss]:
+        """One tick by the structure's methods."""
+        rows, state = self.rows, self.rows.state
+        places, scalars = rows.places, (rows.numbers, rows.counts)
+        before = rows.active
+        ticks.refill(self._start, self._weight, *self._waiting, places, *scalars, state)
+        if rows.active > before:
+            self._here = self.curve.take(rows.lanes)
+        if (active := rows.active) == 0:
+            return []
+        _, _, trial, row = places
+        t, corner, defect = rows.numbers[[kernels.TRIAL, kernels.CORNER, kernels.DEFECT], :active]
+        move = self._here.advance(trial[:active], t, row[:active], corner, defect)
         mass, smallest = self.curve.metric.mass, self.options.smallest_step
-        state = (numbers, counts, active)
-        steps = (move.dz, move.dt, move.tangent_z, move.tangent_t)
-        kernels.correct(*steps, mass, trial, *state, kernels.ACCEPTED, kernels.NEARLY)
-        ends = (move.dz, move.tangent_z, move.tangent_t, mass, self._places)
-        kernels.correct_arrivals(*ends, *state)
-        locates, plain = self.options.locates_branch_points, self.curve.folds_change_index
-        good, doubtful, close = kernels.judge(
-            move.index, move.determinant, *state, smallest, locates, plain
+        steps = (move.dz, move.dt, move.tangent_z, move.tangent_t, mass)
+        kernels.correct(*steps, trial, *scalars, active, kernels.ACCEPTED, kernels.NEARLY)
+        ends = (move.dz, move.tangent_z, move.tangent_t, mass, places)
+        kernels.correct_arrivals(*ends, *scalars, active)
+        locates, plain = self._rules[1:3]
+        _, doubtful, close = kernels.judge(
+            move.index, move.determinant, *scalars, active, smallest, locates, plain
         )
-        if good:
-            branched = self._refuse_jumps(move) if doubtful and locates else None
-            if self.constraints:
-                self._constrain(move)
-            if close and locates:
-                self._look_inside(move)
-            if branched is not None:
-                self._note_branch_points(branched)
-            record = (self._places, self._scalars, active)
-            self.events.add(move.tangent_z, self.options.stops, *record)
-            if self.options.record:
-                self.points.add(trial, *record[1:])
-        finished, given_up = stepping.proceed(move.tangent_z, mass, self._places, *state, smallest)
+        if self._measure() or (locates and doubtful + close):
+            self.rare.judge(move)
+        moved = (move.dz, move.tangent_z, move.tangent_t, move.index, move.determinant)
+        files = rows.events.buffer, rows.points.buffer
+        control = (rows.values, files, state, self._rules)
+        finished, given_up = ticks.finish(moved, mass, self._knobs, places, *scalars, *control)
         lost = self._lost_lanes() if given_up else []
         if given_up or finished > active // PATIENCE:
             self._close()
         return lost
 
-    def _constrain(self, move: Advance) -> None:
-        """Note violated constraints; refuse steps inside which one may be violated for a while."""
-        numbers, counts = self._scalars
-        good = np.flatnonzero(counts[kernels.STAGE, : self.active] == CONVERGED)
-        z, t = self._places[2][good], numbers[kernels.TRIAL, good]
-        here = self._here if len(good) == self.active else self._here.take(good)
-        states = here.states(z, t)
-        last, old = self._excess[::2, good], self._excess[1::2, good]
-        new = np.array([constraint.excess(*states) for constraint in self.constraints])
-        counts[kernels.WHAT, good[(new > 0.0).any(axis=0)]] |= CONSTRAINT
-        close = np.empty(new.shape, bool)
-        if kernels.may_graze(last, old, new, good, numbers, close):
-            for k, constraint in enumerate(self.constraints):
-                near, values = good[close[k]], (old[k, close[k]], new[k, close[k]])
-                self._refuse_grazing(constraint, near, values, move)
-        kept = counts[kernels.STAGE, good] == CONVERGED
-        self._excess[::2, good[kept]] = old[:, kept]
-        self._excess[1::2, good[kept]] = new[:, kept]
+    def _measure(self) -> int:
+        """Values of constraints at starts and ends of steps; how many steps may graze one."""
+        rows = self.rows
+        at = np.flatnonzero((rows.stage == CONVERGED) | (rows.stage == STARTING))
+        if len(self.constraints) == 0 or len(at) == 0:
+            rows.grazing[:] = False
+            return 0
+        here = self._here if len(at) == rows.active else self._here.take(at)
+        states = here.states(rows.places[2][at], rows.numbers[kernels.TRIAL, at])
+        for k, constraint in enumerate(self.constraints):
+            rows.values[3 * k + ticks.NEW, at] = constraint.excess(*states)
+        scalars = rows.numbers, rows.counts
+        return int(ticks.note_excess(rows.values, *scalars, rows.active, rows.grazing))
 
-    def _refuse_grazing(
-        self,
-        constraint: Constraint,
-        at: Some,
-        values: tuple[Float[np.ndarray, " some"], Float[np.ndarray, " some"]],
-        move: Advance,
-    ) -> None:
-        """Refuse steps inside which the cubic through values and slopes may exceed the bound.
+    def _close(self) -> None:
+        self.rows.close()
+        if self._loop is None:
+            self._here = self.curve.take(self.rows.lanes)
 
-        The next try ends where the cubic is largest, where it is exact after a few tries.
-        """
-        if len(at) == 0:
-            return
-        numbers, counts = self._scalars
-        (z, tangent), here = self._present(at), self._here.take(at)
-        length = numbers[kernels.LENGTH, at]
-        norm = numbers[kernels.NORM, at]
-        ends = (
-            (z, numbers[kernels.T, at], tangent, numbers[kernels.SLOPE, at]),
-            (self._places[2][at], numbers[kernels.TRIAL, at], move.tangent_z[at] / norm[:, None],
-             numbers[kernels.NEW_SLOPE, at]),
-        )  # fmt: skip
-        slopes = [_slope(here, constraint, *end) for end in ends]
-        share, least = least_inside((-values[0], -values[1]), (-slopes[0], -slopes[1]), length)
-        rise = -least - np.maximum(*values)
-        grazing = (rise > ON_BOUND * constraint.size) & (least < MISS * rise)
-        counts[kernels.STAGE, at[grazing]] = REFUSED
-        wanted = np.clip(share, 0.1, 0.9) * length / kernels.BACK
-        numbers[kernels.LENGTH, at[grazing]] = wanted[grazing]
-
-    def _refuse_jumps(self, move: Advance) -> Events:
-        """Refuse changes of index or direction without a fold or branch point; the branch points.
-
-        Such a step jumped to another branch, as it does past the narrow gap of a slightly imperfect
-        pitchfork, or passed two folds: a shorter one will not.
-        """
-        counts = self._scalars[1]
-        doubtful: Flags = counts[kernels.STAGE, : self.active] == CONVERGED
-        doubtful &= (counts[kernels.WHAT, : self.active] & BRANCH) != 0
-        at = np.flatnonzero(doubtful)
-        bracket = self._bracket(at, move)
-        place = locate_branch_point(self._here.take(at), bracket)
-        counts[kernels.STAGE, at[~place.found]] = REFUSED
-        return events_at(bracket, EventCode.BRANCH_POINT, place).take(place.found)
-
-    def _note_branch_points(self, events: Events) -> None:
-        """Note located branch points of steps that were not refused for another reason."""
-        counts = self._scalars[1]
-        at = np.flatnonzero(counts[kernels.STAGE, : self.active] == CONVERGED)
-        at = at[np.isin(counts[kernels.LANE, at], events.lanes)]
-        ends = bool(self.options.stops & BRANCH)
-        counts[kernels.WHAT, at] = counts[kernels.WHAT, at] & ~BRANCH | (ENDING if ends else 0)
-        if len(at):
-            self.hidden.append(events.take(np.isin(events.lanes, counts[kernels.LANE, at])))
-
-    def _look_inside(self, move: Advance) -> None:
-        """Search steps that come close to a singular state.
-
-        A step whose start is the singular one is searched together with the step before.
-        """
-        counts = self._scalars[1]
-        stage, what = counts[kernels.STAGE, : self.active], counts[kernels.WHAT, : self.active]
-        at = np.flatnonzero((stage == CONVERGED) & (what & (HIDDEN | EARLY) != 0))
-        events = Events.join([], self.curve.metric.size)
-        if self.options.look_inside and len(at):
-            events = inside_spans(self._here, self._spans(at, move), self.options)
-            lanes = counts[kernels.LANE, events.lanes]
-            known = np.array([self._last.get(lane, -np.inf) for lane in lanes.tolist()])
-            fresh = np.abs(events.travelled - known) > NARROW
-            events, lanes = events.take(fresh), lanes[fresh]
-            self._last.update(zip(lanes.tolist(), events.travelled.tolist(), strict=True))
-            self.hidden.append(replace(events, lanes=lanes))
-        what[np.setdiff1d(at, events.lanes)] &= ~(HIDDEN | EARLY)
-        what[events.lanes[events.code & self.options.stops != 0]] |= ENDING
-
-    def _spans(self, at: Some, move: Advance) -> Span:
-        """Steps of lanes that may hide events: the one before if it is the first, the present."""
-        numbers, what = self._scalars[0], self._scalars[1][kernels.WHAT, at]
-        early = at[what & EARLY != 0]
-        none, unknown = np.zeros(len(early)), np.full(len(early), np.nan)
-        ends = self._front(early, back=1), self._front(early)
-        first = Span(early, *ends, none, numbers[kernels.TRAVELLED, early], unknown)
-        return Span.concatenate([first, self._around(at[what & HIDDEN != 0], move)])
-
-    def _around(self, at: Some, move: Advance) -> Span:
-        """The present steps of lanes, together with those before if they start at the least."""
-        numbers, counts = (scalars[:, at] for scalars in self._scalars)
-        bracket, start = self._bracket(at, move), numbers[kernels.TRAVELLED]
-        low = np.abs(numbers[kernels.DET]) < kernels.NEAR * np.abs(numbers[kernels.NEW_DET])
-        low &= counts[kernels.KNOWN] > 0
-        turn = numbers[kernels.BEND] * numbers[kernels.ARC]
-        behind = start - numbers[kernels.ARC] * np.sinc(turn / np.pi)
-        before = bracket.before.with_rows(np.flatnonzero(low), self._front(at[low], back=1))
-        first = np.where(low, start, np.nan)
-        begun = np.where(low, behind, start)
-        return Span(at, before, bracket.after, begun, start + bracket.step, first)
-
-    def _front(self, at: Some, back: int = 0) -> Front:
-        """Where lanes are, or were one step before."""
-        numbers, counts = self._scalars
-        (z, tangent), index = self._present(at, back), counts[kernels.INDEX, at]
-        t, slope = numbers[kernels.T + 2 * back, at], numbers[kernels.SLOPE + 2 * back, at]
-        return Front(z, t, tangent, slope, index)
-
-    def _present(self, at: Some, back: int = 0) -> tuple[Lanes, Lanes]:
-        """Present points and tangents, of the three that are remembered, or those before."""
-        head = (self._scalars[1][kernels.HEAD, at] - back) % stepping.MEMORY
-        return self._places[0][at, head], self._places[1][at, head]
-
-    def _bracket(self, at: Some, move: Advance) -> Bracket:
-        numbers, counts = (scalars[:, at] for scalars in self._scalars)
-        after = Front(
-            self._places[2][at],
-            numbers[kernels.TRIAL],
-            move.tangent_z[at] / numbers[kernels.NORM][:, None],
-            numbers[kernels.NEW_SLOPE],
-            counts[kernels.NEW_INDEX],
-        )
-        return Bracket(
-            counts[kernels.LANE],
-            self._front(at),
-            after,
-            numbers[kernels.LENGTH],
-            numbers[kernels.TRAVELLED],
-            counts[kernels.WHAT],
-        )
+    # --- lanes that cannot go on ----------------------------------------------------------------
 
     def _lost_lanes(self) -> list[Loss]:
         """Lanes that cannot go on; those that are at their goal but for round-off arrive."""
-        (numbers, counts), lost = self._scalars, list[Loss]()
-        stage = counts[kernels.STAGE, : self.active]
-        for i in np.flatnonzero(stage > ENDED):
-            why = WHY[int(stage[i])].format(most=counts[kernels.MOST, i])
-            front = self._front(np.array([i]))
-            if stage[i] == kernels.SHORT and self._arrives(int(i), front):
+        rows, lost = self.rows, list[Loss]()
+        for i in np.flatnonzero(rows.stage > ENDED):
+            why = WHY[int(rows.stage[i])].format(most=rows.counts[kernels.MOST, i])
+            front = rows.front(np.array([i]))
+            if rows.stage[i] == kernels.SHORT and self._arrives(int(i), front):
                 continue
-            state = self.curve.take(counts[kernels.LANE, [i]]).states(front.z, front.t)
+            state = self.curve.take(rows.lanes[[i]]).states(front.z, front.t)
             if not self.curve.structure.resolved(*state)[0]:
                 why = f"{why}, where {UNRESOLVED}"
-            length = float(numbers[kernels.TRAVELLED, i])
-            lost.append(Loss(int(counts[kernels.LANE, i]), why, front, length))
+            length = float(rows.numbers[kernels.TRAVELLED, i])
+            lost.append(Loss(int(rows.lanes[i]), why, front, length))
         return lost
 
     def _arrives(self, i: int, front: Front) -> bool:
         """Whether Newton's method takes a lane that is next to its goal there; notes the event."""
-        (numbers, counts), up = self._scalars, front.tangent_t > 0.0
+        rows, up = self.rows, front.tangent_t > 0.0
         goal, mark = np.where(up, 1.0, 0.0), np.where(up, ARRIVAL, RETURN)
-        if counts[kernels.STEPS, i] == 0 or np.abs(goal - front.t)[0] > AT_GOAL:
+        if rows.counts[kernels.STEPS, i] == 0 or np.abs(goal - front.t)[0] > AT_GOAL:
             return False
-        lane = counts[kernels.LANE, [i]]
+        lane: Numbers = rows.lanes[[i]]
         curve = self.curve.take(lane)
         z, found = polish(curve, front.z, goal)
         gap = squared_length(curve.metric, curve.weight, z - front.z, goal - front.t)
         there = bool(found[0] and np.sqrt(gap[0]) < FROM_GOAL)
         if there:
             index = np.stack([front.index, front.index], 1)
-            way = numbers[kernels.TRAVELLED, [i]] + np.sqrt(gap)
-            self.hidden.append(Events(lane, mark, z, goal, way, index, found))
+            way = rows.numbers[kernels.TRAVELLED, [i]] + np.sqrt(gap)
+            self.rare.hidden.append(Events(lane, mark, z, goal, way, index, found))
         return there
-
-    def drop(self, lanes: Some) -> None:
-        """Take lanes out, wherever they are."""
-        self._scalars[1][kernels.STAGE, np.flatnonzero(np.isin(self.lanes, lanes))] = ENDED
-        self._close()
-
-    def _close(self) -> None:
-        """Close the gaps of lanes that are finished."""
-        state = (*self._scalars, self._excess)
-        self.active = kernels.close_gaps(self._flat, *state, self.active)
-        self._here = self.curve.take(self.lanes)
-
-
-def _apart(lanes: int) -> int:
-    """Padded length of rows of lanes: rows an even number of cache lines apart share cache sets."""
-    return 8 * (-(-lanes // 8) | 1)
-
-
-def _slope(
-    curve: Curve, constraint: Constraint, z: Lanes, t: Values, tangent_z: Lanes, tangent_t: Values
-) -> Values:
-    """Change of a constraint's excess per length along curves."""
-    h = METRIC_DIFFERENCE
-    ahead, behind = (
-        constraint.excess(*curve.states(z + s * h * tangent_z, t + s * h * tangent_t))
-        for s in (1.0, -1.0)
-    )
-    return np.asarray((ahead - behind) / (2.0 * h))

@@ -6,10 +6,10 @@ import numpy as np
 
 from equimorph.arrays import Flags, Float, Int, Lanes, Numbers, Some, Values
 from equimorph.columns import Columns
-from equimorph.equilibria import event_kernels, kernels
 from equimorph.equilibria.curves import AlongCurve, Curve, along_parameters, dual, squared_length
 from equimorph.equilibria.newton_step import Planes
 from equimorph.equilibria.settle import Guards, settle
+from equimorph.marching import kernels, tick_kernels
 
 
 @dataclass(frozen=True)
@@ -145,23 +145,26 @@ Names = Int[np.ndarray, " points"]
 
 
 class EventFile:
-    """Steps in which something happened, until they are located: room for `room` of them."""
+    """Steps in which something happened, until they are located: room for `room` of them.
 
-    def __init__(self, size: int, room: int) -> None:
-        self.count = 0
+    `state` of the march counts them.
+    """
+
+    def __init__(self, size: int, room: int, state: Names) -> None:
+        self._state = state
         ends = tuple(np.empty((room, size)) for _ in range(4))
-        self._buffer = (*ends, np.empty((6, room)), np.empty((4, room), np.int64))
+        self.buffer = (*ends, np.empty((6, room)), np.empty((4, room), np.int64))
 
-    def add(self, tangent: Lanes, stops: int, places: Places, scalars: Places, active: int) -> None:
-        """Copy such steps of all lanes, and end those lanes that they stop."""
-        state = (places, *scalars, active, self._buffer, self.count)
-        self.count = event_kernels.file_events(tangent, stops, *state)
+    @property
+    def count(self) -> int:
+        """How many there are."""
+        return int(self._state[tick_kernels.EVENTS])
 
     def drain(self) -> Bracket:
         """Hand out everything."""
-        count, self.count = self.count, 0
-        z0, tangent0, z1, tangent1 = (each[:count].copy() for each in self._buffer[:4])
-        values, (lanes, what, before, after) = (each[:, :count].copy() for each in self._buffer[4:])
+        count, self._state[tick_kernels.EVENTS] = self.count, 0
+        z0, tangent0, z1, tangent1 = (each[:count].copy() for each in self.buffer[:4])
+        values, (lanes, what, before, after) = (each[:, :count].copy() for each in self.buffer[4:])
         return Bracket(
             lanes,
             Front(z0, values[0], tangent0, values[1], before),
@@ -175,29 +178,27 @@ class EventFile:
 class PointFile:
     """Regular points of all lanes, with the number of the try in which they were found."""
 
-    def __init__(self, size: int, most: int) -> None:
+    def __init__(self, size: int, most: int, state: Names) -> None:
         self._size, self._most, self._room = size, most, max(ROOM, 2 * most)
-        self._count, self._buffer = 0, self._new()
+        self._state, self.buffer = state, self._new()
         self._parts: list[tuple[Points, Names]] = []
 
     def _new(self) -> Places:
         room = self._room
         return np.empty((room, self._size)), np.empty((2, room)), np.empty((3, room), np.int64)
 
-    def add(self, trial: Lanes, scalars: Places, active: int) -> None:
-        """Copy the ends of good steps of lanes that go on."""
-        if self._count + self._most > self._room:
+    def make_room(self) -> None:
+        """Make room for one point of every lane."""
+        if self._state[tick_kernels.POINTS] + self._most > self._room:
             self._seal()
-        count = self._count
-        self._count = event_kernels.file_points(trial, *scalars, active, self._buffer, count)
 
     def _seal(self) -> None:
-        z, values, names = self._buffer
-        count = slice(0, self._count)
+        z, values, names = self.buffer
+        count = slice(0, int(self._state[tick_kernels.POINTS]))
         lanes, index, tries = names[:, count]
         points = Points(lanes, values[0, count], z[count], values[1, count], index)
         self._parts.append((points, tries))
-        self._count, self._buffer = 0, self._new()
+        self._state[tick_kernels.POINTS], self.buffer = 0, self._new()
 
     def parts(self) -> list[tuple[Points, Names]]:
         """Everything so far, in parts."""

@@ -85,7 +85,7 @@ def trace(
     ledger = _Ledger.of(z)
     capacity = max(1, min(batching.capacity, -(-len(z) // count)))
     jobs = [
-        _Job(Block(curve, constraints, options, capacity, EVENTS_AT_ONCE), queue, ledger, z)
+        _Job(Block(curve, z, constraints, options, capacity, EVENTS_AT_ONCE), queue, ledger)
         for _ in range(count)
     ]
     try:
@@ -145,7 +145,6 @@ class _Job:
     block: Block
     queue: _Queue
     ledger: _Ledger
-    z: Lanes
     again: list[int] = field(default_factory=list)
     passed: list[tuple[Events, Some]] = field(default_factory=list)
     missed: dict[int, str] = field(default_factory=dict)
@@ -153,6 +152,7 @@ class _Job:
     def run(self, report: Callable[[], None] = lambda: None) -> None:
         """Work until the queue is empty and everything is located, or until stopped."""
         try:
+            report()
             while not self.queue.stopped and self._round():
                 report()
         except BaseException:
@@ -162,23 +162,27 @@ class _Job:
     def _round(self) -> bool:
         """One round of all lanes in the block; whether there is more to do."""
         block = self.block
-        if block.active == 0 or block.room >= max(block.capacity // 4, 1):
-            self._fill()
-        if block.active:
-            self._lose(block.tick())
-        waiting = block.events.count + len(block.hidden)
-        if waiting >= (EVENTS_AT_ONCE if block.active else 1):
+        if room := block.wanted:
+            self._fill(room)
+        if block.busy:
+            self._lose(block.run(self._more))
+        waiting = block.rows.events.count + len(block.rare.hidden)
+        if waiting >= (EVENTS_AT_ONCE if block.busy else 1):
             self._locate()
-        return bool(block.active or self.again or self.queue.handed < self.queue.total)
+        return block.busy or self._more
 
-    def _fill(self) -> None:
-        room = self.block.room
+    @property
+    def _more(self) -> bool:
+        """Whether further lanes may come."""
+        return bool(self.again) or self.queue.handed < self.queue.total
+
+    def _fill(self, room: int) -> None:
         old, self.again = self.again[:room], self.again[room:]
         lanes = self.queue.take(room - len(old))
         if old:
             lanes = np.concatenate([np.array(old), lanes])
         if len(lanes):
-            self._lose(self.block.admit(lanes, self.z[lanes], self.ledger.retries[lanes]))
+            self.block.admit(lanes, self.ledger.retries[lanes])
 
     def _lose(self, lost: list[Loss]) -> None:
         """Note lanes that cannot go on."""
@@ -193,11 +197,11 @@ class _Job:
     def _locate(self) -> None:
         """Locate everything that is pending; settle lanes that ended, retry where it failed."""
         block, ledger = self.block, self.ledger
-        curve, bracket, options = block.curve, block.events.drain(), block.options
+        curve, bracket, options = block.curve, block.rows.events.drain(), block.options
         shown = locate_all(curve, [bracket], block.constraints, options)
         only = inside_only_steps(curve, bracket, options)
-        events = Events.join([shown, *block.hidden, *only], curve.metric.size)
-        block.hidden = []
+        events = Events.join([shown, *block.rare.hidden, *only], curve.metric.size)
+        block.rare.hidden = []
         bad = np.unique(events.lanes[~events.found])
         again = bad[ledger.retries[bad] < block.options.retries]
         if len(again):
@@ -267,7 +271,7 @@ def _outcome(ledger: _Ledger, jobs: list[_Job]) -> Traces:
         ledger.code[lane], ledger.why[lane] = EventCode.LOST, reason
     size = ledger.z.shape[1]
     passed = [part.take(_last(ledger, part, t)) for job in jobs for part, t in job.passed]
-    parts = [part for job in jobs for part in job.block.points.parts()]
+    parts = [part for job in jobs for part in job.block.rows.points.parts()]
     points = [
         part if (last := _last(ledger, part, tries)).all() else part.take(last)
         for part, tries in parts

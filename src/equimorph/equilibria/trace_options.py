@@ -7,7 +7,7 @@ import numpy as np
 
 from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Float
-from equimorph.equilibria import kernels
+from equimorph.marching import kernels
 
 
 class EventKind(StrEnum):

@@ -56,6 +56,17 @@ def njit(**options: Any) -> Callable[[Any], Any]:
     return compiled
 
 
+def template(**options: Any) -> Callable[[Any], Any]:
+    """Compile a function as a part of the kernels that give it other kernels as arguments.
+
+    Parameters
+    ----------
+    options
+        Those of `numba.njit`. Only the code of those kernels is kept.
+    """
+    return numba.njit(**options)  # type: ignore[no-any-return]
+
+
 def _alone(dispatcher: Any) -> Callable[[Any], Any]:
     """Compiling a kernel and keeping its code, or reading it, while no other process does.
 

@@ -28,6 +28,7 @@ from equimorph.model import (
     remember_call,
 )
 from equimorph.structures.clearance import straight_arcs
+from equimorph.structures.compiled_steps import CompiledSteps
 from equimorph.structures.equations import Equations
 from equimorph.tables import html_table
 
@@ -376,6 +377,11 @@ class Structure(Rebuilt, Equations):
         """Bound to add where there are equilibria without end within others; empty if none."""
         del within
         return ""
+
+    def compiled_steps(self, within: Sequence[Constraint]) -> CompiledSteps | None:
+        """Compiled loops that follow straight lines under constraints; None: there are none."""
+        del within
+        return None
 
     @property
     def watched(self) -> tuple[Descriptor, ...]:

@@ -10,7 +10,6 @@ import numpy as np
 from equimorph.arrays import Bool, Flags, Float, Int, ItemFlags, Items, Lanes, Numbers
 from equimorph.equilibria import Guards, ParameterLine, TraceOptions, settle
 from equimorph.equilibria.curves import squared_length
-from equimorph.equilibria.kernels import FIRST_SHARE, LEAST_COSINE, MULTIPLIER_WEIGHT
 from equimorph.equilibria.settle import Held, lower_index
 from equimorph.equilibria.trace import Traces, trace
 from equimorph.equilibria.trace_options import EventCode
@@ -18,6 +17,7 @@ from equimorph.manifold.geometry.exact_points import Aim, Pinned, correct_points
 from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.lifting.pairing import Pairing, RayMark, Rays
+from equimorph.marching.kernels import FIRST_SHARE, LEAST_COSINE, MULTIPLIER_WEIGHT
 from equimorph.model import Constraint, are_feasible
 
 LONGEST = 0.5

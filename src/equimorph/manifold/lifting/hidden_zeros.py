@@ -11,9 +11,9 @@ import numpy as np
 
 from equimorph.arrays import Flags, Items, Numbers, Values
 from equimorph.equilibria.determinants import determinants, hides_two_zeros
-from equimorph.equilibria.kernels import EARLY_DIP
 from equimorph.equilibria.steps import Bracket, Front, least_inside
 from equimorph.manifold.lifting.pairing import Pairing, RayMark, Rays
+from equimorph.marching.kernels import EARLY_DIP
 
 STEEP = 1.0
 """Change of the determinant along an edge, relative to the smaller value, from which on a cubic may

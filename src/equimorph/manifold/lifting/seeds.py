@@ -4,11 +4,11 @@ import numpy as np
 
 from equimorph.arrays import Bool, Float, Int, Items, Places, Some
 from equimorph.equilibria import Guards, ParameterLine, TraceOptions, search_points, settle
-from equimorph.equilibria.kernels import MULTIPLIER_WEIGHT
 from equimorph.equilibria.trace import trace
 from equimorph.equilibria.trace_options import EventCode
 from equimorph.manifold.complex.base_mesh import BaseMesh
 from equimorph.manifold.geometry.setting import Setting
+from equimorph.marching.kernels import MULTIPLIER_WEIGHT
 from equimorph.model import are_feasible, position
 
 COARSE = 5

@@ -6,7 +6,9 @@ import numpy as np
 
 from equimorph.arrays import Float, Lanes, Nodal, Parameters, Sides, Values, Velocity
 from equimorph.linalg import BorderedSolution, CondensedLayout, multiply, no_border
+from equimorph.linalg.condensed import PIVOT_GUARD
 from equimorph.linalg.lanes import over_lanes
+from equimorph.structures.compiled_steps import CompiledSteps
 from equimorph.structures.contract import Symmetry
 from equimorph.structures.equations import Advance, AnyBorder, Direction, LinearSystem, Shift
 from equimorph.structures.rod.clamped_derivative_kernels import (
@@ -17,10 +19,11 @@ from equimorph.structures.rod.clamped_derivative_kernels import (
     second_lanes,
 )
 from equimorph.structures.rod.clamped_kernels import advance_lanes
+from equimorph.structures.rod.clamped_march_kernels import march_lanes, search_lanes
 from equimorph.structures.rod.discretisation import Mesh
 from equimorph.structures.rod.fields import ClampedFields
 from equimorph.structures.rod.inertia import inextensible_force, inextensible_inertia
-from equimorph.structures.rod.mechanics import PlanarMechanics
+from equimorph.structures.rod.mechanics import Bounds, PlanarMechanics
 from equimorph.structures.rod.planar_energy import PlanarEnergy
 from equimorph.structures.rod.profiles import LoadShape
 from equimorph.structures.rod.units import FOUR_PI_SQUARED
@@ -201,6 +204,11 @@ class ClampedMechanics(PlanarMechanics):
         """One fused kernel."""
         given = (z, p, dp, row, corner, defect)
         return self.fused_advance(advance_lanes, self._step_data, *given)
+
+    def compiled_steps(self, bounds: Bounds) -> CompiledSteps:
+        """Loops over the fused step and the search for the largest curvature."""
+        tables = self._step_data, self.recovery.extremum_data
+        return CompiledSteps(march_lanes, search_lanes, tables, bounds, PIVOT_GUARD)
 
     def sample(self, p: Parameters, generator: np.random.Generator) -> Lanes:
         """Linear angles plus random sine waves, with random support forces.

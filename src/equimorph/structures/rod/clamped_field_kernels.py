@@ -176,19 +176,38 @@ def _vertex_places(weights, nodal, places):
 
 @njit(**FLAGS)
 def largest_lanes(stiffness, pressures, breaks, nodes, integral, rho, rises, z, p, largest, place):
-    """Largest |κ| over s of each lane and where: vertices, then every extremum that may exceed.
+    """Largest |κ| over s of each lane and where."""
+    work = largest_work(stiffness, rises)
+    largest_in(
+        work, stiffness, pressures, breaks, nodes, integral, rho, rises, z, p, largest, place
+    )
+
+
+@njit(**FLAGS)
+def largest_work(stiffness, rises):
+    """Work arrays of `largest_in`."""
+    elements, order, terms = stiffness.shape[0], stiffness.shape[1], rises.shape[2]
+    n = elements * (order - 1) - 1
+    found = np.empty((LANES, elements * order, 3))
+    return (
+        work_rows(n + 3), work_rows(4), work_rows(n + 2), work_rows(2 * elements), work_rows(2),
+        work_rows(4), work_rows(terms), work_rows(5), work_rows(2 * ORDER), work_rows(ORDER + 1),
+        found, np.empty(LANES, np.int64),
+    )  # fmt: skip
+
+
+@njit(**INNER)
+def largest_in(
+    work, stiffness, pressures, breaks, nodes, integral, rho, rises, z, p, largest, place
+):
+    """`largest_lanes` in work arrays: vertices, then every extremum that may exceed.
 
     Where κ' changes sign between nodes an extremum is sought from the nearer vertex, the most
     promising of each lane first.
     """
+    theta, scalars, forces, ends, best, state, pull, moves, waves, slopes, found, count = work
     elements, order, terms = stiffness.shape[0], stiffness.shape[1], rises.shape[2]
     n = z.shape[1] - 2
-    theta, scalars, forces = work_rows(n + 3), work_rows(4), work_rows(n + 2)
-    ends, best = work_rows(2 * elements), work_rows(2)
-    state, pull, moves = work_rows(4), work_rows(terms), work_rows(5)
-    waves, slopes = work_rows(2 * ORDER), work_rows(ORDER + 1)
-    found = np.empty((LANES, elements * order, 3))
-    count = np.empty(LANES, np.int64)
     for block in range(0, z.shape[0], LANES):
         start = min(block, z.shape[0] - LANES)
         read_state(z, p, start, n, theta, scalars)

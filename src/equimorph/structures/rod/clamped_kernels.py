@@ -255,19 +255,42 @@ def advance_lanes(
     stiffness, ends, weights, loads, z, p, dp, row, corner, defect,
     dz, dt, tangent_z, tangent_t, residual, index, determinant, ratio,
 ):  # fmt: skip
-    """Fused Newton step, tangent and inertia of the rod; see `structures.contract.Advance`.
+    """Fused Newton step, tangent and inertia of the rod; see `structures.contract.Advance`."""
+    advance_in(
+        advance_work(stiffness), stiffness, ends, weights, loads, z, p, dp, row, corner, defect,
+        dz, dt, tangent_z, tangent_t, residual, index, determinant, ratio,
+    )  # fmt: skip
+
+
+@njit(**FLAGS)
+def advance_work(stiffness):
+    """Work arrays of `advance_in`."""
+    elements, inner = stiffness.shape[0], stiffness.shape[1] - 2
+    n = elements * (inner + 1) - 1
+    theta, closing_row, diagonal = work_rows(n + 3), work_rows(n + 2), work_rows(n + 2)
+    scalars, closing, sums = work_rows(4), work_rows(8), work_rows(7)
+    products, small, solution = work_rows(12), work_rows(15), work_rows(2 * (n + 3))
+    closing_row[:] = 0.0
+    return (
+        theta, closing_row, diagonal, scalars, closing, sums, products, small, solution,
+        *work_arrays(elements, inner, ONE_TILE), halved(stiffness), work_rows(inner + 3),
+    )  # fmt: skip
+
+
+@njit(**INNER)
+def advance_in(
+    work, stiffness, ends, weights, loads, z, p, dp, row, corner, defect,
+    dz, dt, tangent_z, tangent_t, residual, index, determinant, ratio,
+):  # fmt: skip
+    """`advance_lanes` in work arrays.
 
     With H = LDLᵀ, products bᵀH⁻¹c need the forward-reduced columns only; the step and the tangent
     are combined from these before the one back-substitution.
     """
+    theta, closing_row, diagonal, scalars, closing, sums, products, small, solution = work[:9]
+    lower, vertices, columns, extremes, halves, pairs = work[9:]
     elements, inner = stiffness.shape[0], stiffness.shape[1] - 2
     lanes, n = z.shape[0], z.shape[1] - 2
-    theta, closing_row, diagonal = work_rows(n + 3), work_rows(n + 2), work_rows(n + 2)
-    scalars, closing, sums = work_rows(4), work_rows(8), work_rows(7)
-    products, small, solution = work_rows(12), work_rows(15), work_rows(2 * (n + 3))
-    lower, vertices, columns, extremes = work_arrays(elements, inner, ONE_TILE)
-    halves, pairs = halved(stiffness), work_rows(inner + 3)
-    closing_row[:] = 0.0
     for block in range(0, lanes, LANES):
         start = min(block, lanes - LANES)
         read_state(z, p, start, n, theta, scalars)

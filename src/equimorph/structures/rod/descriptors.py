@@ -1,6 +1,7 @@
 """Descriptors of a planar rod as methods."""
 
 from abc import abstractmethod
+from collections.abc import Sequence
 from functools import cached_property
 from typing import Any, ClassVar
 
@@ -11,6 +12,7 @@ from equimorph.arrays import Int, Lanes, Parameters, Values
 from equimorph.errors import InputError, MissingError
 from equimorph.model import Constraint, Descriptor, remember_call
 from equimorph.model.descriptor import Branches
+from equimorph.structures.compiled_steps import CompiledSteps
 from equimorph.structures.contract import Readers, Written
 from equimorph.structures.rod import space
 from equimorph.structures.rod.any_rod import Field, Peaks
@@ -105,6 +107,14 @@ class Described(Measured):
     def max_curvature(self) -> Descriptor:
         """max_s |κ(s)| in units of 1/L, ends and interior extrema included."""
         return self.max_curvature_descriptor(self._peaks)
+
+    def compiled_steps(self, within: Sequence[Constraint]) -> CompiledSteps | None:
+        """Loops of the mechanics, if they have some, under bounds on the largest curvature."""
+        if any(each.descriptor != self.max_curvature for each in within):
+            return None
+        unit = self.units.value("curvature")
+        bounds = [(1.0 if c.sense == "<=" else -1.0, unit, c.bound, c.ease) for c in within]
+        return self.mechanics.compiled_steps(np.array(bounds).reshape(-1, 4))
 
     @cached_property
     @remember_call

@@ -11,11 +11,13 @@ from equimorph.errors import InputError
 from equimorph.linalg.condensed import PIVOT_GUARD
 from equimorph.linalg.intervals import Interval
 from equimorph.linalg.lanes import over_lanes
+from equimorph.structures.compiled_steps import CompiledSteps
 from equimorph.structures.contract import Symmetry
 from equimorph.structures.equations import Advance, Direction, Enclosed, Equations
 from equimorph.structures.rod.discretisation import Mesh, error_by_refinement
 from equimorph.structures.rod.planar_energy import PlanarEnergy
 
+Bounds = Float[np.ndarray, "constraints 4"]
 LARGEST_TAIL = 1e-3
 """Highest Legendre coefficients of θ, in radians, of an element that represents its part."""
 
@@ -147,6 +149,14 @@ class PlanarMechanics(RodMechanics):
     @abstractmethod
     def planar_energy(self) -> PlanarEnergy:
         """The Lagrangian as tables."""
+
+    def compiled_steps(self, bounds: Bounds) -> CompiledSteps | None:
+        """Compiled loops under bounds on the largest curvature; None: there are none.
+
+        A bound: sign (−1 for a lower one), unit of the curvature, bound, and ease.
+        """
+        del bounds
+        return None
 
     def enclosure(self, z: Interval, p: Interval) -> Enclosed | None:
         """Bounds over boxes."""

@@ -6,7 +6,8 @@ predicted by the cubic through the ends and corrected like any step, then the br
 
 import numpy as np
 
-from equimorph.equilibria.kernels import (
+from equimorph.linalg.compiled import njit
+from equimorph.marching.kernels import (
     BRIEF,
     CONVERGED,
     CORNER,
@@ -34,7 +35,6 @@ from equimorph.equilibria.kernels import (
     WHAT,
     T,
 )
-from equimorph.linalg.compiled import njit
 
 (
     X1, F1, T1, SLOPE1, RATE1, X2, F2, T2, SLOPE2, RATE2, X3, F3, SHARE, SMALL, T0,

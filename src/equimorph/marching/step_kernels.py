@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from equimorph.equilibria.kernels import (
+from equimorph.linalg.compiled import njit
+from equimorph.marching.kernels import (
     AIMING,
     ARC,
     BACK,
@@ -40,6 +41,7 @@ from equimorph.equilibria.kernels import (
     SLOPE_1,
     SLOPE_2,
     STAGE,
+    STARTING,
     STEPS,
     STUCK,
     SUMS,
@@ -54,7 +56,6 @@ from equimorph.equilibria.kernels import (
     X_2,
     T,
 )
-from equimorph.linalg.compiled import njit
 
 MEMORY = 3
 """Points that a lane remembers, the present one included."""
@@ -63,19 +64,25 @@ LEAST_RATE = 0.3
 
 
 @njit(**{**SUMS, "_nrt": True})
-def proceed(new_tangent, mass, places, numbers, counts, active, smallest):
-    """Take over accepted steps, shorten refused ones, and try the next step of each lane.
+def proceed(move, mass, knobs, places, numbers, counts, active, smallest):
+    """Take over starts and accepted steps, shorten refused ones, and try the next step of lanes.
 
-    Returns how many lanes are finished, and how many of them are given up.
+    `move`: corrections, tangents, dt/ds, index and determinants. Returns how many lanes are
+    finished, and how many of them are given up.
     """
     finished, given_up = 0, 0
     for i in range(active):
         stage = counts[STAGE, i]
+        if stage == STARTING:
+            _start(i, move, mass, knobs, places, numbers, counts)
+            stuck = counts[STAGE, i] == STUCK
+            finished, given_up = finished + stuck, given_up + stuck
+            continue
         if stage not in (CONVERGED, REFUSED):
             finished += stage == ENDED
             continue
         if stage == CONVERGED:
-            _take_over(i, new_tangent, places, numbers, counts)
+            _take_over(i, move[1], places, numbers, counts)
         else:
             numbers[LENGTH, i] *= BACK
         counts[STEPS, i] += 1
@@ -259,39 +266,44 @@ def _guess(i, places, numbers, counts):
         trial[i, j] += c * tangent[i, here, j] + d * tangent[i, one, j] + e * tangent[i, two, j]
 
 
-@njit(**{**SUMS, "_nrt": True})
-def seat(lanes, levels, knobs, start, move, mass, weight, places, numbers, counts, active):
-    """Start lanes behind the active ones at t = 0; return how many cannot be started.
+@njit(**SUMS)
+def _start(i, move, mass, knobs, places, numbers, counts):
+    """Take lane i over to its corrected start, and predict its first step unless it leads nowhere.
 
-    `start`: their points; `move`: their corrections, tangents, dt/ds, index and determinants;
     `knobs`: first and largest step, turning and most steps for each level of retries.
     """
     dz, tangent, slope, index, determinant = move
-    z_here, tangent_here, _, _ = places
-    n, size, stuck = mass.shape[0], start.shape[1], 0
-    for k in range(lanes.shape[0]):
-        i, level = active + k, levels[k]
-        total = 0.0
-        for j in range(n):
-            total += mass[j] * tangent[k, j] * tangent[k, j]
-        squared = weight[k] * weight[k]
-        norm = 1.0 / np.sqrt(total + squared * slope[k] * slope[k])
-        for j in range(size):
-            z_here[i, 0, j] = start[k, j] + dz[k, j]
-            tangent_here[i, 0, j] = tangent[k, j] * norm
-        for row in range(NUMBERS):
-            numbers[row, i] = 0.0
-        for row in range(COUNTS):
-            counts[row, i] = 0
-        numbers[SLOPE, i], numbers[WEIGHT, i] = slope[k] * norm, squared
-        numbers[DET, i] = determinant[k]
-        numbers[LENGTH, i], numbers[LARGEST, i] = knobs[0, level], knobs[1, level]
-        numbers[TURNING, i], counts[MOST, i] = knobs[2, level], int(knobs[3, level])
-        counts[LANE, i], counts[INDEX, i], counts[LEVEL, i] = lanes[k], index[k], level
-        # the slope per length, however far the goal is
-        if np.isfinite(total) and numbers[SLOPE, i] * max(1.0, weight[k]) > LEVEL_SLOPE:
-            predict(i, mass, places, numbers, counts)
-        else:
-            counts[STAGE, i] = STUCK
-            stuck += 1
-    return stuck
+    z_here, tangent_here, trial, _ = places
+    n, size, level = mass.shape[0], trial.shape[1], counts[LEVEL, i]
+    total = 0.0
+    for j in range(n):
+        total += mass[j] * tangent[i, j] * tangent[i, j]
+    norm = 1.0 / np.sqrt(total + numbers[WEIGHT, i] * slope[i] * slope[i])
+    for j in range(size):
+        z_here[i, 0, j] = trial[i, j] + dz[i, j]
+    for j in range(size):
+        tangent_here[i, 0, j] = tangent[i, j] * norm
+    numbers[SLOPE, i], numbers[DET, i] = slope[i] * norm, determinant[i]
+    numbers[LENGTH, i], numbers[LARGEST, i] = knobs[0, level], knobs[1, level]
+    numbers[TURNING, i], counts[MOST, i] = knobs[2, level], int(knobs[3, level])
+    counts[INDEX, i] = index[i]
+    # the slope per length, however far the goal is
+    steep = numbers[SLOPE, i] * max(1.0, np.sqrt(numbers[WEIGHT, i]))
+    if np.isfinite(total) and steep > LEVEL_SLOPE:
+        predict(i, mass, places, numbers, counts)
+    else:
+        counts[STAGE, i] = STUCK
+
+
+@njit(**SUMS)
+def enter(lane, level, i, start, weight, places, numbers, counts):
+    """Place a lane in row i at t = 0, where its first Newton step is one at fixed t."""
+    _, _, trial, row = places
+    for j in range(row.shape[1]):
+        trial[i, j], row[i, j] = start[lane, j], 0.0
+    for k in range(NUMBERS):
+        numbers[k, i] = 0.0
+    for k in range(COUNTS):
+        counts[k, i] = 0
+    numbers[WEIGHT, i], numbers[CORNER, i] = weight[lane] * weight[lane], 1.0
+    counts[LANE, i], counts[LEVEL, i], counts[STAGE, i] = lane, level, STARTING

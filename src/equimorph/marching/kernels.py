@@ -35,9 +35,10 @@ the step; events in the step; steps so far and their limit; number of retries; w
 remembered points is the present one; how many points before it are known."""
 COUNTS = 11
 
-CORRECTING, AIMING, CONVERGED, REFUSED, ENDED, SHORT, LONG, STUCK = range(8)
-"""Stages: in Newton's iteration; in that of a step to the end of t; step converged; step refused;
-lane finished; given up: step too short, too many steps, or a singular start."""
+STARTING, CORRECTING, AIMING, CONVERGED, REFUSED, ENDED, SHORT, LONG, STUCK = range(9)
+"""Stages: at t = 0, before the first step; in Newton's iteration; in that of a step to the end of
+t; step converged; step refused; lane finished; given up: step too short, too many steps, or a
+singular start."""
 
 ARRIVAL, RETURN, FOLD, BRANCH, CONSTRAINT, CRITICAL = 1, 2, 4, 8, 16, 32
 """Bits of what can happen in a step."""
@@ -330,31 +331,6 @@ def _hides_early(i, numbers):
     if not (slope < 0.0 and slope + 2.0 * bow * before > 0.0):
         return False
     return start - slope * slope / (4.0 * bow) < EARLY_DIP * min(start, here)
-
-
-@njit(**{**BRIEF, "_nrt": True})
-def may_graze(last, here, new, good, numbers, out):
-    """Whether constraints may be violated inside steps that obey them at both ends.
-
-    By values at the step before, here and at the end: how far they may rise in between, and whether
-    they may fall at the end. Returns how many such steps there are.
-    """
-    found = 0
-    for k in range(new.shape[0]):
-        for i in range(new.shape[1]):
-            before, length = numbers[ARC, good[i]], numbers[LENGTH, good[i]]
-            room, rise = -max(here[k, i], new[k, i]), new[k, i] - here[k, i]
-            reach, peak = abs(rise), True
-            if before > 0.0:
-                slope, earlier = rise / length, (here[k, i] - last[k, i]) / before
-                change = slope - earlier
-                reach = max(reach, abs(change) * length)
-                start = earlier + change * before / (before + length)
-                end = slope + change * length / (before + length)
-                peak = start + abs(change) > 0.0 and end - abs(change) < 0.0
-            out[k, i] = peak and 0.0 < room < reach
-            found += out[k, i]
-    return found
 
 
 @njit(**BRIEF)

@@ -1,0 +1,159 @@
+"""Steps of the march that need more than its kernels: doubtful ones, and what steps may hide.
+
+See docs/decisions.md, "Lanes march in compiled kernels".
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from equimorph.arrays import Float, Lanes, Some, Values
+from equimorph.equilibria.curves import Curve
+from equimorph.equilibria.events import Events, events_at
+from equimorph.equilibria.inside_steps import NARROW, Span, inside_spans
+from equimorph.equilibria.legs import ON_BOUND
+from equimorph.equilibria.locate import locate_branch_point
+from equimorph.equilibria.rows import Rows
+from equimorph.equilibria.steps import least_inside
+from equimorph.equilibria.trace_options import EventCode, TraceOptions
+from equimorph.marching import kernels
+from equimorph.marching.kernels import BRANCH, CONVERGED, EARLY, ENDING, HIDDEN, REFUSED
+from equimorph.model import Constraint
+from equimorph.structures import Advance
+from equimorph.tolerances import METRIC_DIFFERENCE
+
+MISS = 0.1
+"""Error of the largest value of a cubic inside a step, as a share of its rise above the ends."""
+
+
+class RareSteps:
+    """Judgement of rare steps of the lanes of a block; events that it locates are in `hidden`."""
+
+    def __init__(
+        self, curve: Curve, constraints: tuple[Constraint, ...], options: TraceOptions, rows: Rows
+    ) -> None:
+        self.curve, self.constraints, self.options, self.rows = curve, constraints, options, rows
+        self.hidden: list[Events] = []
+        self._last: dict[int, float] = {}
+
+    def forget(self, lanes: Some) -> None:
+        """Forget what was found in the steps of lanes that start anew."""
+        for lane in lanes.tolist() if self._last else ():
+            self._last.pop(lane, None)
+
+    def judge(self, move: Advance) -> None:
+        """Refuse steps that jumped or graze constraints; locate what others hide."""
+        locates, what = self.options.locates_branch_points, self.rows.what
+        good = self.rows.stage == CONVERGED
+        branched = None
+        if locates and (good & (what & BRANCH != 0)).any():
+            branched = self._refuse_jumps(move)
+        good = self.rows.stage == CONVERGED
+        close = [np.flatnonzero(good & row[: len(good)]) for row in self.rows.grazing]
+        for k, at in enumerate(close):
+            if len(at):
+                self._refuse_grazing(k, at, move)
+        if locates and (what & (HIDDEN | EARLY) != 0).any():
+            self._look_inside(move)
+        if branched is not None:
+            self._note_branch_points(branched)
+
+    def _refuse_grazing(self, k: int, at: Some, move: Advance) -> None:
+        """Refuse steps inside which the cubic through values and slopes may exceed the bound.
+
+        The next try ends where the cubic is largest, where it is exact after a few tries.
+        """
+        rows, constraint = self.rows, self.constraints[k]
+        here, length = self.curve.take(rows.lanes[at]), rows.numbers[kernels.LENGTH, at]
+        values = rows.values[3 * k + 1, at], rows.values[3 * k + 2, at]
+        ends = rows.front(at), rows.ahead(at, move)
+        slopes = [
+            _slope(here, constraint, end.z, end.t, end.tangent_z, end.tangent_t) for end in ends
+        ]
+        share, least = least_inside((-values[0], -values[1]), (-slopes[0], -slopes[1]), length)
+        rise = -least - np.maximum(*values)
+        grazing = (rise > ON_BOUND * constraint.size) & (least < MISS * rise)
+        rows.stage[at[grazing]] = REFUSED
+        wanted = np.clip(share, 0.1, 0.9) * length / kernels.BACK
+        rows.numbers[kernels.LENGTH, at[grazing]] = wanted[grazing]
+
+    def _refuse_jumps(self, move: Advance) -> Events:
+        """Refuse changes of index or direction without a fold or branch point; the branch points.
+
+        Such a step jumped to another branch, as it does past the narrow gap of a slightly imperfect
+        pitchfork, or passed two folds: a shorter one will not.
+        """
+        rows = self.rows
+        at = np.flatnonzero((rows.stage == CONVERGED) & (rows.what & BRANCH != 0))
+        bracket = rows.bracket(at, move)
+        place = locate_branch_point(self.curve.take(bracket.lanes), bracket)
+        rows.stage[at[~place.found]] = REFUSED
+        return events_at(bracket, EventCode.BRANCH_POINT, place).take(place.found)
+
+    def _note_branch_points(self, events: Events) -> None:
+        """Note located branch points of steps that were not refused for another reason."""
+        rows, what = self.rows, self.rows.what
+        at = np.flatnonzero(rows.stage == CONVERGED)
+        at = at[np.isin(rows.lanes[at], events.lanes)]
+        ends = bool(self.options.stops & BRANCH)
+        what[at] = what[at] & ~BRANCH | (ENDING if ends else 0)
+        if len(at):
+            self.hidden.append(events.take(np.isin(events.lanes, rows.lanes[at])))
+
+    def _look_inside(self, move: Advance) -> None:
+        """Search steps that come close to a singular state.
+
+        A step whose start is the singular one is searched together with the step before.
+        """
+        rows, what = self.rows, self.rows.what
+        at = np.flatnonzero((rows.stage == CONVERGED) & (what & (HIDDEN | EARLY) != 0))
+        events = Events.join([], self.curve.metric.size)
+        if self.options.look_inside and len(at):
+            events = inside_spans(self.curve.take(rows.lanes), self._spans(at, move), self.options)
+            lanes = rows.lanes[events.lanes]
+            known = np.array([self._last.get(lane, -np.inf) for lane in lanes.tolist()])
+            fresh = np.abs(events.travelled - known) > NARROW
+            events, lanes = events.take(fresh), lanes[fresh]
+            self._last.update(zip(lanes.tolist(), events.travelled.tolist(), strict=True))
+            self.hidden.append(replace(events, lanes=lanes))
+        what[np.setdiff1d(at, events.lanes)] &= ~(HIDDEN | EARLY)
+        what[events.lanes[events.code & self.options.stops != 0]] |= ENDING
+
+    def _spans(self, at: Some, move: Advance) -> Span:
+        """Steps of lanes that may hide events: the one before if it is the first, the present."""
+        rows, what = self.rows, self.rows.what[at]
+        early = at[what & EARLY != 0]
+        none, unknown = np.zeros(len(early)), np.full(len(early), np.nan)
+        ends, stop = (rows.front(early, back=1), rows.front(early)), kernels.TRAVELLED
+        first = Span(early, *ends, none, rows.numbers[stop, early], unknown)
+        return Span.concatenate([first, self._around(at[what & HIDDEN != 0], move)])
+
+    def _around(self, at: Some, move: Advance) -> Span:
+        """The present steps of lanes, together with those before if they start at the least."""
+        rows, numbers = self.rows, self.rows.numbers[:, at]
+        bracket, start = rows.bracket(at, move), numbers[kernels.TRAVELLED]
+        low = np.abs(numbers[kernels.DET]) < kernels.NEAR * np.abs(numbers[kernels.NEW_DET])
+        low &= rows.counts[kernels.KNOWN, at] > 0
+        turn = numbers[kernels.BEND] * numbers[kernels.ARC]
+        behind = start - numbers[kernels.ARC] * np.sinc(turn / np.pi)
+        before = bracket.before.with_rows(np.flatnonzero(low), rows.front(at[low], back=1))
+        first = np.where(low, start, np.nan)
+        begun = np.where(low, behind, start)
+        return Span(at, before, bracket.after, begun, start + bracket.step, first)
+
+
+def _slope(
+    curve: Curve,
+    constraint: Constraint,
+    z: Lanes,
+    t: Values,
+    tangent_z: Lanes,
+    tangent_t: Values,
+) -> Float[np.ndarray, " lanes"]:
+    """Change of a constraint's excess per length along curves."""
+    h = METRIC_DIFFERENCE
+    ahead, behind = (
+        constraint.excess(*curve.states(z + s * h * tangent_z, t + s * h * tangent_t))
+        for s in (1.0, -1.0)
+    )
+    return np.asarray((ahead - behind) / (2.0 * h))

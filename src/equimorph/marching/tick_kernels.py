@@ -1,0 +1,266 @@
+"""Compiled kernels of one tick of all lanes, and the loop over ticks that structures make theirs.
+
+A tick is one Newton step of every lane and all that follows from it. `march` goes on by itself
+until lanes need what is not compiled; its `state` tells where in a tick that was.
+"""
+
+import numpy as np
+
+from equimorph.linalg.compiled import njit, template
+from equimorph.linalg.kernels import FLAGS
+from equimorph.linalg.simd import LANES
+from equimorph.marching.event_kernels import file_events, file_points
+from equimorph.marching.kernels import (
+    ACCEPTED,
+    ARC,
+    CONSTRAINT,
+    CONVERGED,
+    CORNER,
+    DEFECT,
+    LANE,
+    LENGTH,
+    NEARLY,
+    STAGE,
+    STARTING,
+    SUMS,
+    TRIAL,
+    WHAT,
+    close_gaps,
+    correct,
+    correct_arrivals,
+    judge,
+)
+from equimorph.marching.step_kernels import enter, proceed
+
+PHASE, ACTIVE, WAITING, EVENTS, POINTS = range(5)
+"""Entries of `state`: where in a tick; lanes on their way; how many of those that waited have
+entered; steps with events, and points, that are filed."""
+STEP, CORRECT, FINISH, CLOSE = range(4)
+"""Parts of a tick: Newton step; correction, judgement and constraints; files and the next
+prediction; closing of gaps."""
+IDLE, UNSAFE, RARE, LOST = range(4)
+"""Why `march` returns: nothing is left to do, or files are full; a pivot is unsafe; steps are
+doubtful, may hide something or graze a constraint; lanes are given up."""
+LAST, HERE, NEW = range(3)
+"""Rows of the values of each constraint: at the step before, here, and at the end of the step."""
+ENOUGH = 4
+"""Reciprocal share of free rows from which on more lanes are asked for."""
+
+
+@njit(**{**SUMS, "_nrt": True})
+def refill(start, weight, lanes, levels, places, numbers, counts, state):
+    """Let waiting lanes into the free rows."""
+    while state[ACTIVE] < places[2].shape[0] and state[WAITING] < lanes.shape[0]:
+        at, i = state[WAITING], state[ACTIVE]
+        enter(lanes[at], levels[at], i, start, weight, places, numbers, counts)
+        state[WAITING], state[ACTIVE] = at + 1, i + 1
+
+
+@njit(**{**SUMS, "_nrt": True})
+def note_excess(values, numbers, counts, active, grazing):
+    """Note violated constraints, and those that may be violated inside steps only.
+
+    By values at the step before, here and at the end: how far they may rise in between, and whether
+    they may fall at the end. Returns how many such steps there are.
+    """
+    found = 0
+    for k in range(grazing.shape[0]):
+        for i in range(active):
+            grazing[k, i] = False
+            if counts[STAGE, i] != CONVERGED:
+                continue
+            here, new = values[3 * k + HERE, i], values[3 * k + NEW, i]
+            if new > 0.0:
+                counts[WHAT, i] |= CONSTRAINT
+            before, length = numbers[ARC, i], numbers[LENGTH, i]
+            room, rise = -max(here, new), new - here
+            reach, peak = abs(rise), True
+            if before > 0.0:
+                slope, earlier = rise / length, (here - values[3 * k + LAST, i]) / before
+                change = slope - earlier
+                reach = max(reach, abs(change) * length)
+                start = earlier + change * before / (before + length)
+                end = slope + change * length / (before + length)
+                peak = start + abs(change) > 0.0 and end - abs(change) < 0.0
+            grazing[k, i] = peak and 0.0 < room < reach
+            found += grazing[k, i]
+    return found
+
+
+@njit(**{**SUMS, "_nrt": True})
+def finish(move, mass, knobs, places, numbers, counts, values, files, state, rules):
+    """File events and points of good steps, and take all lanes on to their next prediction.
+
+    Returns how many lanes are finished, and how many of them are given up.
+    """
+    smallest, _, _, stops, records = rules
+    active = state[ACTIVE]
+    for k in range(0, values.shape[0], 3):
+        for i in range(active):
+            if counts[STAGE, i] == CONVERGED:
+                values[k + LAST, i], values[k + HERE, i] = values[k + HERE, i], values[k + NEW, i]
+            elif counts[STAGE, i] == STARTING:
+                values[k + LAST, i], values[k + HERE, i] = np.nan, values[k + NEW, i]
+    events, points = files
+    state[EVENTS] = file_events(
+        move[1], stops, places, numbers, counts, active, events, state[EVENTS]
+    )
+    if records:
+        state[POINTS] = file_points(places[2], numbers, counts, active, points, state[POINTS])
+    return proceed(move, mass, knobs, places, numbers, counts, active, smallest)
+
+
+@njit(**{**FLAGS, "_nrt": False})
+def _on_lines(line, numbers, counts, at, count, p):
+    """Parameters of lanes `at` at their trial points.
+
+    Products are stored before the sums: in one loop they would be rounded together, unlike those of
+    the general path.
+    """
+    start, velocity = line
+    for i in range(count):
+        lane, t = counts[LANE, at[i]], numbers[TRIAL, at[i]]
+        for c in range(p.shape[1]):
+            p[i, c] = t * velocity[lane, c]
+    for i in range(count):
+        lane = counts[LANE, at[i]]
+        for c in range(p.shape[1]):
+            p[i, c] += start[lane, c]
+
+
+@njit(**{**FLAGS, "_nrt": False})
+def lay_out(line, trial, row, numbers, counts, active, p, dp, at):
+    """Parameters of trial points and their velocities; copies of the last lane fill a vector."""
+    for i in range(active):
+        at[i] = i
+    _on_lines(line, numbers, counts, at, active, p)
+    for i in range(active):
+        lane = counts[LANE, i]
+        for c in range(p.shape[1]):
+            dp[i, c] = line[1][lane, c]
+    last = active - 1
+    for i in range(active, LANES):
+        for j in range(row.shape[1]):
+            trial[i, j], row[i, j] = trial[last, j], row[last, j]
+        for c in range(p.shape[1]):
+            p[i, c], dp[i, c] = p[last, c], dp[last, c]
+        numbers[CORNER, i], numbers[DEFECT, i] = numbers[CORNER, last], numbers[DEFECT, last]
+
+
+@njit(**{**FLAGS, "_nrt": False})
+def gather(line, trial, numbers, counts, active, z, p, at):
+    """Copy starts and the ends of good steps, to fill a vector at least; return how many."""
+    count = 0
+    for i in range(active):
+        if counts[STAGE, i] == CONVERGED or counts[STAGE, i] == STARTING:
+            for j in range(z.shape[1]):
+                z[count, j] = trial[i, j]
+            at[count] = i
+            count += 1
+    if count == 0:
+        return 0
+    _on_lines(line, numbers, counts, at, count, p)
+    for i in range(count, LANES):
+        for j in range(z.shape[1]):
+            z[i, j] = z[count - 1, j]
+        for c in range(p.shape[1]):
+            p[i, c] = p[count - 1, c]
+        at[i] = at[count - 1]
+    return max(count, LANES)
+
+
+@njit(**{**FLAGS, "_nrt": False})
+def any_below(ratio, active, least):
+    """Whether the ratio of any lane is below the least one, or none."""
+    below = 0
+    for i in range(active):
+        below += not ratio[i] >= least
+    return below > 0
+
+
+@njit(**{**FLAGS, "_nrt": False})
+def _is_idle(state, lanes, files, rows, limits):
+    """Whether no lane is left, files are full, or more lanes are wanted and may be there."""
+    most_events, more, records = limits
+    active = state[ACTIVE]
+    if active == 0 or state[EVENTS] >= most_events:
+        return True
+    if records and state[POINTS] + active > files[1][0].shape[0]:
+        return True
+    return more and state[WAITING] == lanes.shape[0] and (rows - active) * ENOUGH >= rows
+
+
+def march_of(step, excess):
+    """Loop over ticks with the kernels of a structure.
+
+    Parameters
+    ----------
+    step, excess
+        Kernels ``step(work, tables, z, p, dp, row, corner, defect, *move)``, and
+        ``excess(work, tables, z, p, bounds, found)`` for values of constraints (constraints, rows).
+        They need at least a vector of rows; `work` are their arrays, `tables` what lanes share.
+    """
+
+    @template(**FLAGS)
+    def measure(work, tables, bounds, line, block, scratch):
+        """Values of constraints at starts and ends of good steps; how many steps may graze one."""
+        places, _, numbers, counts, values, grazing, state = block
+        _, _, z, p, at, found = scratch
+        count = gather(line, places[2], numbers, counts, state[ACTIVE], z, p, at)
+        if count > 0:
+            excess(work, tables, z[:count], p[:count], bounds, found)
+            for k in range(grazing.shape[0]):
+                for i in range(count):
+                    values[3 * k + NEW, at[i]] = found[k, i]
+        return note_excess(values, numbers, counts, state[ACTIVE], grazing)
+
+    @template(**FLAGS)
+    def march(work, tables, bounds, problem, queue, block, move, files, scratch, rules):
+        """March until nothing is left that is compiled; return why."""
+        line, weight, mass, knobs, start, guard = problem
+        lanes, levels, most_events, more = queue
+        places, flat, numbers, counts, values, _, state = block
+        dz, dt, tangent, slope, residual, index, determinant, ratio = move
+        step_of = (dz, tangent, slope, index, determinant)
+        _, _, trial, row = places
+        p, dp = scratch[0], scratch[1]
+        smallest, locates, plain, _, records = rules
+        while True:
+            if state[PHASE] == STEP:
+                refill(start, weight, lanes, levels, places, numbers, counts, state)
+                if _is_idle(state, lanes, files, trial.shape[0], (most_events, more, records)):
+                    return IDLE
+                active = state[ACTIVE]
+                lay_out(line, trial, row, numbers, counts, active, p, dp, scratch[4])
+                n = max(active, LANES)
+                step(
+                    work, tables, trial[:n], p[:n], dp[:n], row[:n], numbers[CORNER, :n],
+                    numbers[DEFECT, :n], dz[:n], dt[:n], tangent[:n], slope[:n], residual[:n],
+                    index[:n], determinant[:n], ratio[:n],
+                )  # fmt: skip
+                state[PHASE] = CORRECT
+                if any_below(ratio, active, guard):
+                    return UNSAFE
+            active = state[ACTIVE]
+            if state[PHASE] == CORRECT:
+                around = mass, trial, numbers, counts, active
+                correct(dz, dt, tangent, slope, *around, ACCEPTED, NEARLY)
+                correct_arrivals(dz, tangent, slope, mass, places, numbers, counts, active)
+                _, doubtful, close = judge(
+                    index, determinant, numbers, counts, active, smallest, locates, plain
+                )
+                rare = measure(work, tables, bounds, line, block, scratch)
+                state[PHASE] = FINISH
+                if rare > 0 or (locates and doubtful + close > 0):
+                    return RARE
+            if state[PHASE] == FINISH:
+                _, given_up = finish(
+                    step_of, mass, knobs, places, numbers, counts, values, files, state, rules
+                )
+                state[PHASE] = CLOSE
+                if given_up > 0:
+                    return LOST
+            state[ACTIVE] = close_gaps(flat, numbers, counts, values, state[ACTIVE])
+            state[PHASE] = STEP
+
+    return march

@@ -1,0 +1,108 @@
+"""The loops that a rod compiles as a whole do what the general ones do, bit for bit."""
+
+from dataclasses import fields
+
+import numpy as np
+import pytest
+
+import equimorph as em
+from equimorph.equilibria import ParameterLine, TraceOptions, Traces, trace
+from equimorph.equilibria.trace import Batching
+from equimorph.errors import InputError
+from equimorph.structures import States
+from equimorph.structures.rod import Rod
+
+
+@pytest.fixture(scope="module")
+def starts() -> States:
+    """Natural states of the arch with their loads."""
+    arch, generator = em.Rod(load="uniform"), np.random.default_rng(5)
+    p = np.zeros((200, 4))
+    p[:, 0], p[:, 1] = generator.uniform(0.2, 2.5, len(p)), generator.uniform(-2.0, 2.0, len(p))
+    p[:, 3] = np.sin(1.0)
+    states, found = arch.natural_states(p)
+    states = states[np.flatnonzero(found)]
+    return states[np.flatnonzero(arch.max_curvature(states) <= 10)]
+
+
+def _traced(starts: States, count: int, bounds: tuple[float, ...], **options: object) -> Traces:
+    arch, some = starts.structure, starts[np.arange(count)]
+    within = [arch.max_curvature <= bound for bound in bounds[:1]]
+    within += [arch.max_curvature >= bound for bound in bounds[1:]]
+    curve = ParameterLine(arch, some.p, np.tile([0.1, 0.0, 20.0, 0.0], (count, 1)))
+    return trace(curve, some.z, tuple(within), TraceOptions(**options))
+
+
+def _columns(record: object) -> list[np.ndarray]:
+    columns = []
+    for each in (getattr(record, field.name) for field in fields(record)):
+        if isinstance(each, np.ndarray):
+            columns.append(each)
+        elif hasattr(each, "__dataclass_fields__"):
+            columns += _columns(each)
+    return columns
+
+
+THROUGH = {"through_folds": True, "through_branch_points": True}
+
+
+@pytest.mark.parametrize(
+    ("count", "bounds", "options"),
+    [
+        (1, (), {}),
+        (1, (10.0,), {"largest_step": 0.02}),
+        (7, (10.0,), {}),
+        (40, (10.0, 2.5), {"record": False}),
+        (40, (), THROUGH),
+        (40, (20.0,), {**THROUGH, "largest_step": 0.1}),
+    ],
+)
+def test_compiled_loops_equal_the_general_ones(
+    starts: States,
+    count: int,
+    bounds: tuple[float, ...],
+    options: dict[str, object],
+    monkeypatch: pytest.MonkeyPatch,
+):
+    """Ends, points and events passed are the same numbers: the same kernels in the same order."""
+    compiled = _traced(starts, count, bounds, **options)
+    monkeypatch.setattr(Rod, "compiled_steps", lambda *_: None)
+    general = _traced(starts, count, bounds, **options)
+    assert compiled.why == general.why
+    for one, other in zip(_columns(compiled), _columns(general), strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+def test_results_of_compiled_loops_do_not_depend_on_other_lanes(starts: States):
+    """Each lane alone ends where it ends among others, to the bit."""
+    together = _traced(starts, 20, (10.0,))
+    for lane in range(20):
+        alone = _traced(starts[np.array([lane])], 1, (10.0,))
+        assert alone.code[0] == together.code[lane]
+        np.testing.assert_array_equal(alone.z[0], together.z[lane])
+        np.testing.assert_array_equal(alone.t[0], together.t[lane])
+
+
+@pytest.mark.parametrize("capacity", [1, 8, 13])
+def test_results_of_compiled_loops_do_not_depend_on_the_batch(starts: States, capacity: int):
+    some, arch = starts[np.arange(50)], starts.structure
+    curve = ParameterLine(arch, some.p, np.tile([0.0, 0.0, 20.0, 0.0], (50, 1)))
+    whole = trace(curve, some.z)
+    parts = trace(curve, some.z, batching=Batching(capacity=capacity, threads=1))
+    for one, other in zip(_columns(whole), _columns(parts), strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+def test_constraints_on_other_descriptors_take_the_general_loop():
+    arch = em.Rod(load="uniform")
+    assert arch.compiled_steps([arch.max_curvature <= 10]) is not None
+    assert arch.compiled_steps([arch.height(0.5) >= 0]) is None
+    assert arch.compiled_steps([abs(arch.max_curvature) <= 10]) is None
+    assert em.Spring().compiled_steps([]) is None
+
+
+def test_states_of_another_resolution_are_refused_before_kernels_read_them(starts: States):
+    some, finer = starts[np.arange(3)], em.Rod(load="uniform", elements=8)
+    curve = ParameterLine(finer, some.p, np.tile([0.0, 0.0, 20.0, 0.0], (3, 1)))
+    with pytest.raises(InputError, match="resolution"):
+        trace(curve, some.z)
