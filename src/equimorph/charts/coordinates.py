@@ -31,6 +31,7 @@ FORWARD = 1e-6
 QUICK = Guards(iterations=8, longest=np.inf, too_long=0.3, converged=1e-7, contraction=0.7, free=3)
 """Over parameters: a long step means a fold near by, where this does not work."""
 ON_SET = Guards(iterations=20, longest=0.3, converged=1e-7, contraction=0.7, free=3)
+"""Along the set, where folds are no obstacle."""
 
 Square = Float[np.ndarray, "lanes d d"]
 

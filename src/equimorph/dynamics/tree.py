@@ -10,6 +10,7 @@ from equimorph.dynamics.linkage import Linkage
 from equimorph.dynamics.mechanism import Vector
 
 WORLD = -1
+"""Parent of bodies that hang on nothing else."""
 
 
 @dataclass(frozen=True, eq=False)

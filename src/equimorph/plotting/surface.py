@@ -36,6 +36,7 @@ Pieces = Float[np.ndarray, "pieces 3 3"]
 _ELEVATION, _AZIMUTH = 23.0, 125.0
 """Direction of view, in degrees."""
 ASPECT = np.array([1.2, 1.3, 1.0])
+"""Sides of the box that a surface fills."""
 _ZOOM = 1.17
 """Magnification of the solid view within its axes."""
 _LINES_PER_TICK = 2

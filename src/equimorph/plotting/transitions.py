@@ -23,6 +23,7 @@ _TREE_ROOM, _PATH_ROOM = (0.66, 0.66, 0.1, 0.1), (0.66, 0.98, 0.1, 0.1)
 _PLANE_ROOM = (0.5, 0.42, 0.62, 0.1)
 """Inches around the axes: left, bottom, right, top; shapes stand below."""
 _HEIGHT = 2.7
+"""Height of a diagram in inches."""
 _BAND, _BELOW_TREE, _BELOW_PATH = 0.3, -0.33, -0.45
 """Height and bottoms of the shapes, as shares of the height of the axes."""
 _LABEL_PAD = 40.0
@@ -30,6 +31,7 @@ _LABEL_PAD = 40.0
 _WIDEST = 0.9
 """Width of a shape, as a share of the distance of two leaves."""
 _MOST_SHAPES = 8
+"""Largest number of shapes below a diagram."""
 _BORDER = 0.08
 _HEADROOM = 0.12
 """Of the energies."""

@@ -38,6 +38,7 @@ FORMAT = "equimorph schedule"
 VERSION = 2
 """Version of the layout of the sidecar file; 1, without times and units, can be read."""
 READABLE = (1, VERSION)
+"""Versions of sidecars that can be read."""
 COLUMNS = "columns"
 """Key of the numbers in a file of JSON alone."""
 

@@ -8,6 +8,7 @@ from equimorph.model.obstacle import Obstacle
 STEPS = 8
 """Newton steps towards the nearest point of an arc."""
 STARTS = np.array([0.0, 1.0])
+"""Places on an arc from which Newton's method starts: its ends."""
 
 Vectors = Float[np.ndarray, "lanes points space"]
 Arcs = Float[np.ndarray, "lanes arcs 4 space"]

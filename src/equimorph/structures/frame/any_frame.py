@@ -6,7 +6,6 @@ from functools import cached_property
 from typing import Any, ClassVar, NamedTuple, NoReturn
 
 import numpy as np
-from numpy.polynomial import legendre
 
 from equimorph.arrays import Float, Lanes, Parameters, Values, Velocity
 from equimorph.errors import InputError
@@ -27,12 +26,6 @@ from equimorph.structures.rod.discretisation import error_by_refinement
 from equimorph.structures.vibration import MaterialPoints
 from equimorph.tolerances import SINGULAR
 
-FINE = 4
-"""Places in each element, per degree, among which an extremum of the curvature is sought."""
-LOWEST = 0.84
-"""Least share of the largest norm of all places that one next to the extremum has: √cos(π/4)."""
-POLISHING = 5
-"""Newton iterations from there."""
 WALKED = 17
 """Places along a piece of a member where it is drawn."""
 SEGMENT = np.linspace(0.0, 1.0, WALKED)
@@ -206,50 +199,6 @@ class AnyFrame(StressedFrame, Shortening):
             return largest
 
         return error_by_refinement(self.guess_for(finer, z, p), correction, change)
-
-    def largest_norms(
-        self, values: Float[np.ndarray, "lanes elements order components"]
-    ) -> Float[np.ndarray, "lanes elements"]:
-        """Largest norm of a vector given at the nodes, in each element: that of its highest peak.
-
-        The square of the norm is a polynomial in cos ϑ. A maximum M of one of degree m is at least
-        M cos(m ϑ) within an angle of ϑ < π/m (M. Riesz), so that a peak of the grid lies near it
-        and is not lower than `LOWEST` of the highest; each of those is polished.
-        """
-        mesh = self.model.mesh
-        series = np.einsum("ij,lejk->leik", mesh.reference.to_legendre, values)
-        angles = np.linspace(np.pi, 0.0, FINE * mesh.degree + 1)
-        basis = legendre.legvander(np.cos(angles), mesh.degree)
-        sizes = np.linalg.norm(np.einsum("gi,leik->legk", basis, series), axis=3)
-        sides = np.pad(sizes, ((0, 0), (0, 0), (1, 1)), constant_values=-np.inf)
-        high = sizes >= LOWEST * sizes.max(axis=2, keepdims=True)
-        lane, element, at = np.nonzero(
-            (sizes >= sides[:, :, :-2]) & (sizes > sides[:, :, 2:]) & high
-        )
-        slope = np.pad(legendre.legder(np.eye(mesh.degree + 1)), ((0, 1), (0, 0)))
-        own = series[lane, element]
-        first = np.einsum("ij,njk->nik", slope, own)
-        second = np.einsum("ij,njk->nik", slope, first)
-        grid = np.cos(angles)
-        place, low, top = (
-            grid[at],
-            grid[np.maximum(at - 1, 0)],
-            grid[np.minimum(at + 1, len(grid) - 1)],
-        )
-        for _ in range(POLISHING):
-            basis = legendre.legvander(place, mesh.degree)
-            value, rate, bend = (
-                np.einsum("ni,nik->nk", basis, each) for each in (own, first, second)
-            )
-            down = (value * rate).sum(axis=1)
-            curved = (value * bend + rate**2).sum(axis=1)
-            move = np.where(curved < 0.0, down / np.where(curved == 0.0, 1.0, curved), 0.0)
-            place = np.clip(place - move, low, top)
-        basis = legendre.legvander(place, mesh.degree)
-        largest = sizes.max(axis=2)
-        polished = np.linalg.norm(np.einsum("ni,nik->nk", basis, own), axis=1)
-        np.maximum.at(largest, (lane, element), polished)
-        return np.asarray(largest)
 
     # --- pictures -------------------------------------------------------------------------------
 

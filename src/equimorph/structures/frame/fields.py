@@ -13,6 +13,7 @@ from equimorph.structures.frame.any_frame import AnyFrame
 from equimorph.structures.frame.mechanics import FrameMechanics
 from equimorph.structures.frame.model import FrameModel
 from equimorph.structures.frame.strength import Nodal, NodalStrains
+from equimorph.structures.rod.extrema import largest_norms
 
 
 class FrameFields(FrameMechanics, AnyFrame):
@@ -138,7 +139,7 @@ class FrameFields(FrameMechanics, AnyFrame):
         """max |κ| in every member."""
         found = self.curvatures(z, p)
         elements = len(self.model.nodes), found.shape[-1]
-        largest = self.largest_norms(found.reshape(len(z), *elements, 1))
+        largest = largest_norms(self.model.mesh, found.reshape(len(z), *elements, 1))
         return np.asarray(largest.reshape(found.shape[:3]).max(axis=2))
 
     def stretched_tangents(

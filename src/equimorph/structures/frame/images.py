@@ -14,6 +14,7 @@ from equimorph.structures.contract import Symmetry
 from equimorph.tolerances import SAME_NUMBER
 
 NOWHERE = -1
+"""In place of the number of an image, where there is none."""
 Matrix = Float[np.ndarray, "scalars scalars"]
 Exchange = tuple[Float[np.ndarray, " parameters"], Int[np.ndarray, " parameters"]]
 Effects = list[tuple[np.ndarray, np.ndarray]]

@@ -1,4 +1,4 @@
-"""Extrema along a rod: local maxima of sampled functions, and of curvature."""
+"""Extrema along rods: of sampled functions, of curvature, of norms of vectors in elements."""
 
 from functools import lru_cache
 
@@ -17,6 +17,12 @@ INTERVALS = 16
 """Equal intervals of each piece."""
 NEWTON = 5
 """Newton iterations towards the maximum of a polynomial."""
+FINE = 4
+"""Places in each element, per degree, among which an extremum of the curvature is sought."""
+LOWEST = 0.84
+"""Least share of the largest norm of all places that one next to the extremum has: √cos(π/4)."""
+POLISHING = 5
+"""Newton iterations from the highest places towards the extremum."""
 
 
 def stations(breaks: Float[np.ndarray, " ends"]) -> Float[np.ndarray, " samples"]:
@@ -158,3 +164,43 @@ def _extrema_of_interpolants(
             moved = x - turn / rate
         x = np.where((moved >= low) & (moved <= high), moved, x)
     return np.asarray(np.maximum(legendre.legval(x, series, tensor=False), np.abs(at_top)))
+
+
+def largest_norms(
+    mesh: Mesh, values: Float[np.ndarray, "lanes elements order components"]
+) -> Float[np.ndarray, "lanes elements"]:
+    """Largest norm of a vector given at the nodes, in each element: that of its highest peak.
+
+    The square of the norm is a polynomial in cos ϑ. A maximum M of one of degree m is at least
+    M cos(m ϑ) within an angle of ϑ < π/m (M. Riesz), so that a peak of the grid lies near it
+    and is not lower than `LOWEST` of the highest; each of those is polished.
+    """
+    series = np.einsum("ij,lejk->leik", mesh.reference.to_legendre, values)
+    angles = np.linspace(np.pi, 0.0, FINE * mesh.degree + 1)
+    basis = legendre.legvander(np.cos(angles), mesh.degree)
+    sizes = np.linalg.norm(np.einsum("gi,leik->legk", basis, series), axis=3)
+    sides = np.pad(sizes, ((0, 0), (0, 0), (1, 1)), constant_values=-np.inf)
+    high = sizes >= LOWEST * sizes.max(axis=2, keepdims=True)
+    lane, element, at = np.nonzero((sizes >= sides[:, :, :-2]) & (sizes > sides[:, :, 2:]) & high)
+    slope = np.pad(legendre.legder(np.eye(mesh.degree + 1)), ((0, 1), (0, 0)))
+    own = series[lane, element]
+    first = np.einsum("ij,njk->nik", slope, own)
+    second = np.einsum("ij,njk->nik", slope, first)
+    grid = np.cos(angles)
+    place, low, top = (
+        grid[at],
+        grid[np.maximum(at - 1, 0)],
+        grid[np.minimum(at + 1, len(grid) - 1)],
+    )
+    for _ in range(POLISHING):
+        basis = legendre.legvander(place, mesh.degree)
+        value, rate, bend = (np.einsum("ni,nik->nk", basis, each) for each in (own, first, second))
+        down = (value * rate).sum(axis=1)
+        curved = (value * bend + rate**2).sum(axis=1)
+        move = np.where(curved < 0.0, down / np.where(curved == 0.0, 1.0, curved), 0.0)
+        place = np.clip(place - move, low, top)
+    basis = legendre.legvander(place, mesh.degree)
+    largest = sizes.max(axis=2)
+    polished = np.linalg.norm(np.einsum("ni,nik->nk", basis, own), axis=1)
+    np.maximum.at(largest, (lane, element), polished)
+    return np.asarray(largest)

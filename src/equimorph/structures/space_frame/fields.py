@@ -11,6 +11,7 @@ from equimorph.model.drawing import supports_of_point
 from equimorph.structures.frame.any_frame import AnyFrame
 from equimorph.structures.frame.statics import SpaceFlows
 from equimorph.structures.frame.strength import Nodal, NodalStrains
+from equimorph.structures.rod.extrema import largest_norms
 from equimorph.structures.space_frame.mechanics import SpatialFrameMechanics
 from equimorph.structures.space_frame.model import SpatialFrameModel
 from equimorph.structures.space_frame.network import SpatialNetwork, Turning
@@ -182,7 +183,7 @@ class SpatialFrameFields(SpatialFrameMechanics, AnyFrame):
 
     def largest_curvatures(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes pieces"]:
         """Largest bending curvature √(κ_n² + κ_b²) in every piece."""
-        largest = self.largest_norms(self.section_strains(z, p)[..., 1:])
+        largest = largest_norms(self.model.mesh, self.section_strains(z, p)[..., 1:])
         return np.asarray(largest.reshape(len(z), *self._elements[:2]).max(axis=2))
 
     def stretched_tangents(

@@ -42,7 +42,7 @@ POLISHING = np.int64(4)
 """Newton iterations towards the largest curvature of an element."""
 LOWEST = 0.8
 """Least share of the largest κ² of all stations that one next to the extremum has: with five
-stations a degree cos(π/5), by the inequality in `AnyFrame.largest_norms`."""
+stations a degree cos(π/5), by the inequality in `largest_norms` of `rod.extrema`."""
 ONE = np.int64(1)
 """Parts of the jets: values only."""
 

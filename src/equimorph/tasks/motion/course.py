@@ -22,6 +22,7 @@ RATE = 1e-4
 EXACT = 1e-10
 """Last correction, in the metric and scaled parameters, of a point that counts as found."""
 GUARDS = Guards(iterations=12, longest=0.3, converged=EXACT)
+"""Limits of corrections onto targets."""
 
 Times = Float[np.ndarray, " n"]
 Prescribed = Float[np.ndarray, "n columns"]

@@ -14,6 +14,7 @@ from equimorph.tasks.planning.objectives import Places
 Some = Int[np.ndarray, " n"]
 
 FEW = Guards(iterations=8)
+"""Limits of corrections of moved corners, which begin close to the set."""
 SIZES = (0.12, 0.04, 0.013)
 """Moves of corners, in scaled parameters, that are tried one after the other."""
 ROUNDS, POLISHING = 6, 2
