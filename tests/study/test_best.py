@@ -134,6 +134,7 @@ def test_a_followed_optimum_stays_on_the_folds(run):
     np.testing.assert_allclose(found.values[0], np.arcsin(0.02 ** (1 / 3)), rtol=1e-6)
     np.testing.assert_allclose(found.values[-1], np.arcsin(0.01 ** (1 / 3)), rtol=1e-6)
     assert "stability boundary" in page(run[1])
+    assert "stability boundary, stable" not in page(run[1])  # which the kind says already
     schedule = read_schedule(run[1] / "pushed-follow-schedule.csv")
     np.testing.assert_allclose(schedule.values[-1, 0], np.cos(found.values[-1]) ** 3, rtol=1e-5)
 
