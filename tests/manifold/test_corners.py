@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from equimorph.manifold import equilibrium_set, refine
-from equimorph.manifold.complex.marked_complex import fabric_of
+from equimorph.manifold.complex.excerpts import fabric_of
 from equimorph.manifold.refining.quality import confined_angles, corner_angles
 from equimorph.model import Box
 from oracles.surfaces import transcriticals

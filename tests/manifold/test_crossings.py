@@ -14,7 +14,7 @@ from equimorph.manifold import (
     refine,
     restricted,
 )
-from equimorph.manifold.complex.marked_complex import fabric_of
+from equimorph.manifold.complex.excerpts import fabric_of
 from equimorph.manifold.geometry.topology import adjacency
 from equimorph.manifold.refining.quality import confined_angles, smallest_angles
 from equimorph.model import Box, Descriptor

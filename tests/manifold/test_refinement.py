@@ -12,13 +12,8 @@ from equimorph.errors import InputError
 from equimorph.manifold import equilibrium_set, refine
 from equimorph.manifold.complex.description import Complex
 from equimorph.manifold.complex.edge_points import Places, on_edges, unmet
-from equimorph.manifold.complex.marked_complex import (
-    Fabric,
-    FacetMark,
-    _bisect,
-    edges_of,
-    fabric_of,
-)
+from equimorph.manifold.complex.excerpts import fabric_of
+from equimorph.manifold.complex.marked_complex import Fabric, FacetMark, _bisect, edges_of
 from equimorph.manifold.geometry.simplices import volumes
 from equimorph.manifold.geometry.topology import adjacency, chains, euler_characteristic
 from equimorph.manifold.queries.cusps import with_cusps_beside

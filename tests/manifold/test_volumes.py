@@ -13,7 +13,8 @@ from equimorph.manifold import (
     refine,
     stability_distance,
 )
-from equimorph.manifold.complex.marked_complex import fabric_of, squared_sides
+from equimorph.manifold.complex.excerpts import fabric_of
+from equimorph.manifold.complex.marked_complex import squared_sides
 from equimorph.manifold.geometry.exact_points import Aim, correct_points
 from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.geometry.simplices import volumes

@@ -4,7 +4,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from equimorph.manifold import EquilibriumSet
-from equimorph.manifold.complex.marked_complex import fabric_of
+from equimorph.manifold.complex.excerpts import fabric_of
 from equimorph.manifold.geometry.simplices import volumes
 from equimorph.manifold.geometry.topology import (
     adjacency,

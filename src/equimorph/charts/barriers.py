@@ -139,7 +139,8 @@ def _outward(cells: Cells, facets: Facets, used: Some, size: Place) -> Float[np.
     at = cells.values[cells.corners[cell]] / size
     first = np.take_along_axis(at, ((corner + 1) % at.shape[1])[:, None, None], axis=1)
     own = at[np.arange(len(cell)), corner]
-    rest = np.stack([np.delete(a, k, axis=0) for a, k in zip(at, corner, strict=True)])
+    others = np.array([[k for k in range(at.shape[1]) if k != left] for left in range(at.shape[1])])
+    rest = at[np.arange(len(cell))[:, None], others[corner]]
     along = rest[:, 1:] - rest[:, :1]
     away = first[:, 0] - own
     if along.shape[1]:

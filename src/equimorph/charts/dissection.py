@@ -19,13 +19,14 @@ from equimorph.charts.preparation import (
     flip_inverted_triangles,
 )
 from equimorph.manifold import EquilibriumSet
-from equimorph.manifold.complex.marked_complex import Fabric, fabric_of, squared_sides
+from equimorph.manifold.complex.excerpts import Excerpt, excerpt_of
+from equimorph.manifold.complex.marked_complex import Fabric, squared_sides
 from equimorph.manifold.complex.vertices import Vertices, free_vertices
 from equimorph.manifold.geometry.exact_points import Corrected
 from equimorph.manifold.geometry.points import on_fold
 from equimorph.manifold.geometry.topology import chains, flags_of, keys_of, labels
 from equimorph.manifold.lookup.exact_states import exact_states
-from equimorph.manifold.queries.levels import part_of
+from equimorph.manifold.queries.levels import whole_set
 from equimorph.structures import States
 from equimorph.tolerances import SAME_NUMBER
 
@@ -73,8 +74,7 @@ def dissect(eset: EquilibriumSet) -> Atlas:
     fabric = replace(work.fabric, cell_index=index[work.origin[work.fabric.cell_index]])
     whole = eset
     if len(fabric.vertices) > len(eset.points):
-        nothing = np.zeros(len(fabric.vertices), bool)
-        whole = part_of(eset, fabric, np.ones(len(fabric.cells), bool), nothing, 0)
+        whole = whole_set(work.excerpt.put_back(fabric))
     _, label = np.unique(work.fabric.cell_index, return_inverse=True)
     order = np.argsort(-np.bincount(label), kind="stable")
     rank = np.empty(len(order), int)
@@ -89,8 +89,8 @@ class _Work:
 
     Parameters
     ----------
-    eset
-        The set that was given.
+    excerpt
+        The set that was given, all of it.
     fabric
         Its cells, cut; ``fabric.cell_index`` is the number of their chart.
     origin
@@ -99,7 +99,7 @@ class _Work:
         Vertices at cusps.
     """
 
-    eset: EquilibriumSet
+    excerpt: Excerpt
     fabric: Fabric
     origin: Int[np.ndarray, " charts"]
     cusps: tuple[int, ...] = ()
@@ -107,9 +107,16 @@ class _Work:
     @classmethod
     def of(cls, eset: EquilibriumSet) -> "_Work":
         """Nothing is cut: charts are strata."""
-        fabric = fabric_of(eset, on_fold(eset.kinds))  # whose frames find cusps
+        folded = on_fold(eset.kinds)  # where frames find cusps
+        excerpt = excerpt_of(eset, np.ones(len(eset.cells), bool), folded)
         number = np.arange(len(eset.strata))
-        return cls(eset, replace(fabric, cell_index=eset.stratum.copy()), number)
+        fabric = replace(excerpt.fabric, cell_index=eset.stratum.copy())
+        return cls(excerpt, fabric, number)
+
+    @property
+    def eset(self) -> EquilibriumSet:
+        """The set that was given."""
+        return self.excerpt.eset
 
     def cells(self, chart: int) -> tuple[Cells, Int[np.ndarray, " own"]]:
         """Cells of a chart in the plane of parameters, and their numbers."""

@@ -26,6 +26,7 @@ from equimorph.equilibria import ParameterLine, TraceOptions
 from equimorph.equilibria.trace import trace
 from equimorph.equilibria.trace_options import EventCode
 from equimorph.manifold import EquilibriumSet
+from equimorph.manifold.complex.kept_tables import adjacency_of, places_of
 from equimorph.manifold.geometry.points import VertexKind, are_singular, on_fold
 from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.geometry.simplices import volumes
@@ -39,7 +40,7 @@ from equimorph.manifold.geometry.topology import (
 from equimorph.manifold.lookup.cell_index import CellIndex, Hits
 from equimorph.manifold.lookup.exact_states import root_weights
 from equimorph.model import are_feasible
-from equimorph.structures import States
+from equimorph.structures import States, join_states
 from equimorph.tolerances import SAME_STATE
 
 Guess = tuple[Float[np.ndarray, "hits size"], Float[np.ndarray, "hits parameters"]]
@@ -120,7 +121,8 @@ class Cells:
     @cached_property
     def whole(self) -> Adjacency:
         """Which cells share facets."""
-        return adjacency(self.corners)
+        every = len(self.numbers) == len(self.eset.cells)
+        return adjacency_of(self.eset) if every else adjacency(self.corners)
 
     @cached_property
     def turn(self) -> Float[np.ndarray, " own"]:
@@ -181,6 +183,36 @@ class Cells:
         z, p, point, cell, inside = (np.concatenate(column) for column in zip(*parts, strict=True))
         return Found(States(self.eset.structure, z, p), point, cell, inside)
 
+    @cached_property
+    def over_vertices(self) -> tuple[Some, Found]:
+        """Vertices of the cells off crossings, and all states over each of them.
+
+        Over the grid these are vertices; elsewhere they are found.
+        """
+        eset, corners = self.eset, self.corners
+        grid = eset.grid_vertex
+        vertex, first = np.unique(corners, return_index=True)
+        cell = self.numbers[first // corners.shape[1]]
+        some = vertex[eset.kinds[vertex] != VertexKind.CROSSING]
+        away, own = np.flatnonzero(grid[some] < 0), np.flatnonzero(grid[some] >= 0)
+        found = self.find(self.values[some[away]])
+        order = np.argsort(grid[vertex], kind="stable")
+        low, high = (
+            np.searchsorted(grid[vertex[order]], grid[some[own]], side)
+            for side in ("left", "right")
+        )
+        count = high - low
+        among = order[np.repeat(low - np.cumsum(count) + count, count) + np.arange(count.sum())]
+        states = eset.points[vertex[among]]
+        point = np.concatenate([away[found.point], np.repeat(own, count)])
+        both = Found(
+            join_states(states.structure, [found.states, states]),
+            point,
+            np.concatenate([found.cell, cell[among]]),
+            np.concatenate([found.inside, np.ones(len(among), bool)]),
+        )
+        return some, both.take(np.argsort(point, kind="stable"))
+
     def _some(self, points: Points, first: int) -> tuple[np.ndarray, ...]:
         hits = self._index.near(points)
         hits = hits.take(hits.inside | self._edge[hits.cell])
@@ -240,8 +272,7 @@ class Cells:
     @cached_property
     def _frames(self) -> Float[np.ndarray, "own d coordinates"]:
         """Sides of the cells from their first corners, in the metric."""
-        setting = self.coordinates.setting
-        place = embed(setting, self.eset.points.z, self.eset.points.p)
+        place = places_of(self.eset)
         return np.asarray(place[self.corners[:, 1:]] - place[self.corners[:, :1]])
 
     @cached_property
@@ -327,7 +358,7 @@ def facet_kinds(cells: Cells) -> tuple[Facets, np.ndarray]:
     some = np.flatnonzero((whole.counts == 1) | cells.turning)
     facets = whole.facets[some]
     folds = facets_of(eset.folds, facets.shape[1])
-    all_of_them = adjacency(eset.cells)
+    all_of_them = adjacency_of(eset)
     outer = flags_of(facets, all_of_them.facets[all_of_them.counts == 1])
     capped = np.isin(eset.kinds, (VertexKind.CAP, VertexKind.CORNER))[facets].all(axis=1)
     met = (eset.kinds == VertexKind.CROSSING)[facets].all(axis=1)

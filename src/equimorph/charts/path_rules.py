@@ -32,6 +32,7 @@ from equimorph.equilibria.trace import Traces, trace
 from equimorph.equilibria.trace_options import EventCode
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
+from equimorph.manifold.complex.kept_tables import from_cache
 from equimorph.model import (
     Box,
     Constraint,
@@ -83,6 +84,10 @@ class Unloaded:
         InputError
             If the parameter does not vanish in natural states.
         """
+        return from_cache(eset, ("unloaded", parameter), lambda: cls._of(eset, parameter))
+
+    @classmethod
+    def _of(cls, eset: EquilibriumSet, parameter: str) -> "Unloaded":
         structure = eset.structure
         load, unloaded = position(structure.parameters, parameter), structure.unloaded()
         if parameter not in unloaded:

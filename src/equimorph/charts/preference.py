@@ -1,6 +1,6 @@
 """The choice of a rule over points and at states, and the part of a set that it prefers."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import permutations
 
@@ -8,9 +8,9 @@ import numpy as np
 
 from equimorph.arrays import (
     Bool,
-    CellFlags,
     Flags,
     Float,
+    Int,
     ItemFlags,
     Items,
     ItemValues,
@@ -26,16 +26,11 @@ from equimorph.charts.score_changes import changes_by_score
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.complex.cuts import Ends, cut_between
 from equimorph.manifold.complex.edge_points import Places, on_edges
-from equimorph.manifold.complex.marked_complex import (
-    Fabric,
-    FacetMark,
-    edges_of,
-    ends_of_changes,
-    fabric_of,
-)
+from equimorph.manifold.complex.excerpts import changing_cells, excerpt_of
+from equimorph.manifold.complex.marked_complex import Fabric, FacetMark, edges_of
 from equimorph.manifold.complex.vertices import Vertices, vertices_of
 from equimorph.manifold.geometry.points import VertexKind, are_singular, on_fold
-from equimorph.manifold.geometry.topology import adjacency, flags_of, keys_of
+from equimorph.manifold.geometry.topology import keys_of
 from equimorph.manifold.lookup.exact_states import exact_states, root_weights
 from equimorph.manifold.queries.levels import part_of
 from equimorph.structures import States, join_states
@@ -49,8 +44,12 @@ PARTS, BATCH, ROUNDS, LOCATED = (3, 64), 800, 24, 3.0**-16
 """Fewest and most parts into which an edge is divided in a round, and states that are examined in
 one: few take nearly as long as many. Rounds, and the share of an edge, 2e-8, to which the change is
 located."""
-GUESSES = 4
+GUESSES = 2
 """Every so many rounds edges are divided on both sides of places that the rule knows."""
+GRADED = np.concatenate([0.1 ** np.arange(7, 0, -1), [0.5], 1.0 - 0.1 ** np.arange(1, 8)])
+"""Shares at which edges without such a place are divided then."""
+OFF_FOLD = 1e-3
+"""Share of an edge next to an end on a fold, where F_z is singular, in which no rule is asked."""
 ASIDE, APART = 1e-4, 0.4
 """Distances from such a place at which it is confirmed: shares of the edge, and of the distance
 from the next place. Closer to a cusp paths tell two folds from one that they touch less well."""
@@ -77,31 +76,6 @@ class Preference:
         """
         both, points = self._with_others(z, p, found)
         return self.choice.choose(both, points)[len(both.point) - len(z) :]
-
-    def over_vertices(self, some: Items) -> Found:
-        """States over vertices of the set: vertices, over the grid; elsewhere they are found."""
-        grid, corners = self.cells.eset.grid_vertex, self.cells.corners
-        away = np.flatnonzero(grid[some] < 0)
-        found = self.cells.find(self.cells.values[some[away]])
-        vertex, first = np.unique(corners, return_index=True)
-        cell = self.cells.numbers[first // corners.shape[1]]
-        order = np.argsort(grid[vertex], kind="stable")
-        own = np.flatnonzero(grid[some] >= 0)
-        low, high = (
-            np.searchsorted(grid[vertex[order]], grid[some[own]], side)
-            for side in ("left", "right")
-        )
-        count = high - low
-        among = order[np.repeat(low - np.cumsum(count) + count, count) + np.arange(count.sum())]
-        states = self.cells.eset.points[vertex[among]]
-        point = np.concatenate([away[found.point], np.repeat(own, count)])
-        both = Found(
-            join_states(states.structure, [found.states, states]),
-            point,
-            np.concatenate([found.cell, cell[among]]),
-            np.concatenate([found.inside, np.ones(len(among), bool)]),
-        )
-        return both.take(np.argsort(point, kind="stable"))
 
     def excess(self, z: Lanes, p: Parameters) -> Values:
         """Function that is positive where another state is preferred.
@@ -165,15 +139,17 @@ def preferred_part(preference: Preference) -> tuple[EquilibriumSet, VertexFlags,
     among = np.zeros(len(eset.cells), bool)
     among[preference.cells.numbers] = True
     values = _signs(preference)
-    fabric = fabric_of(eset, ends_of_changes(preference.cells.corners, values))
     # only candidates are cut: their neighbours beyond folds play no part
-    fabric = _only(fabric, among)
-    crossings = _Crossings(preference, fabric, values)
-    cut = cut_between(fabric, values, crossings.between)
-    inside = (cut.values[cut.fabric.cells] <= 0.0).all(axis=1)
-    used = np.unique(cut.fabric.cells[inside])
-    chosen = part_of(eset, cut.fabric, inside, cut.on_level, cut.lost)
-    return chosen, cut.on_level[used], cut.lost
+    excerpt = excerpt_of(eset, among & changing_cells(eset.cells, values))
+    own = values[excerpt.used]
+    crossings = _Crossings(preference, excerpt.fabric, own)
+    cut = cut_between(excerpt.fabric, own, crossings.between)
+    recut = excerpt.put_back(cut.fabric)
+    values = np.concatenate([values, cut.values[len(own) :]])
+    inside = (values[recut.cells] <= 0.0).all(axis=1)
+    inside[: len(among)] &= among
+    used = np.unique(recut.cells[inside])
+    return part_of(recut, inside, values == 0.0, cut.lost), values[used] == 0.0, cut.lost
 
 
 class _Crossings:
@@ -208,12 +184,6 @@ class _Crossings:
         return done, self._found.take(order[np.searchsorted(self._keys[order], wanted[done])])
 
 
-def _only(fabric: Fabric, cells: CellFlags) -> Fabric:
-    """Some cells of a fabric, with their facets."""
-    own = flags_of(fabric.facets, adjacency(fabric.cells[cells]).facets)
-    return replace(fabric.only(cells), facets=fabric.facets[own], marks=fabric.marks[own])
-
-
 def _signs(preference: Preference) -> Float[np.ndarray, " V"]:
     """−1 at preferred vertices, 1 elsewhere."""
     eset, corners = preference.cells.eset, preference.cells.corners
@@ -223,17 +193,12 @@ def _signs(preference: Preference) -> Float[np.ndarray, " V"]:
     values[met] = np.where(_preferred_beside(preference, met), -1.0, 1.0)
     used = used[eset.kinds[used] != VertexKind.CROSSING]
     states, scored = eset.points[used], preference.choice.score is not None
-    found = preference.over_vertices(used) if scored else None
+    found = preference.cells.over_vertices[1] if scored else None
     values[used] = np.where(preference.prefers(states.z, states.p, found), -1.0, 1.0)
     folded = on_fold(eset.kinds)
     # paths to a fold end just before it or there: look a little way off
     doubtful = used[folded[used] & (values[used] > 0.0)]
-    pairs = np.unique(
-        np.concatenate([corners[:, list(two)] for two in permutations(range(corners.shape[1]), 2)]),
-        axis=0,
-    )
-    pairs = pairs[np.isin(pairs[:, 0], doubtful) & ~folded[pairs[:, 1]]]
-    fold, other = pairs[np.diff(pairs[:, 0], prepend=-1) > 0].T
+    fold, other = _neighbours_off_folds(corners, doubtful, folded)
     points = preference.cells.values
     there = preference.over((1.0 - BESIDE) * points[fold] + BESIDE * points[other])
     n, mass = eset.structure.unknowns, eset.structure.mass
@@ -242,6 +207,21 @@ def _signs(preference: Preference) -> Float[np.ndarray, " V"]:
     own = far < MOVED**2 * ((z[other[there.point]] - z[fold[there.point]]) ** 2 @ mass)
     values[fold[there.point[own]]] = -1.0
     return values
+
+
+def _neighbours_off_folds(
+    corners: Int[np.ndarray, "C corners"], some: Items, folded: VertexFlags
+) -> tuple[Items, Items]:
+    """Those of some vertices that have neighbours off folds, and the first of these of each."""
+    wanted = np.zeros(len(folded), bool)
+    wanted[some] = True
+    corners = corners[wanted[corners].any(axis=1)]
+    two = list(permutations(range(corners.shape[1]), 2))
+    pairs = np.concatenate([corners[:, list(each)] for each in two])
+    pairs = pairs[wanted[pairs[:, 0]] & ~folded[pairs[:, 1]]]
+    pairs = pairs[np.lexsort(pairs.T[::-1])]
+    first = pairs[np.diff(pairs[:, 0], prepend=-1) > 0]
+    return first[:, 0], first[:, 1]
 
 
 def _preferred_beside(preference: Preference, met: Items) -> ItemFlags:
@@ -276,24 +256,21 @@ def _locate_changes(
         wide = todo[high[todo] - low[todo] > LOCATED]
         if len(wide) == 0:
             break
-        guessed = number % GUESSES == 0
-        parts = PARTS[0] if guessed else int(np.clip(BATCH // len(wide), *PARTS))
-        cuts = low[wide, None] + (high - low)[wide, None] * np.arange(parts + 1) / parts
+        span = np.stack([low[wide], high[wide]], axis=1)
         exact: ItemValues = np.full(len(wide), np.nan)
-        if guessed:
-            span = cuts[:, [0, -1]]
-            exact = _enclose(cuts, way.changes(preference, wide, span, first[wide]))
-        at, lanes = cuts[:, 1:-1], np.repeat(wide, parts - 1)
-        z, p, good = way.states(lanes, at.ravel())
-        same: ItemFlags = np.zeros(len(lanes), bool)
-        same[good] = preference.prefers(z[good], p[good]) == first[lanes[good]]
-        good, same = good.reshape(at.shape), np.reshape(same, at.shape)
-        passed = np.where(same.all(axis=1), parts - 1, same.argmin(axis=1))
+        if number % GUESSES == 0:
+            shares = way.changes(preference, wide, span, first[wide])
+            cuts, exact = _enclose(span, shares)
+        else:
+            parts = int(np.clip(BATCH // len(wide), *PARTS))
+            cuts = span[:, :1] + np.diff(span, axis=1) * np.arange(parts + 1) / parts
+        good, same = _compare(preference, way, wide, cuts, first[wide])
+        passed = np.where(same.all(axis=1), same.shape[1], same.argmin(axis=1))
         every: Items = np.arange(len(wide))
         low[wide], high[wide] = cuts[every, passed], cuts[every, passed + 1]
         sure = (passed == 1) & np.isfinite(exact)
         low[wide[sure]] = high[wide[sure]] = exact[sure]
-        unknown = ~good[every, np.minimum(passed, parts - 2)]
+        unknown = ~good[every, np.minimum(passed, good.shape[1] - 1)]
         todo = np.setdiff1d(todo, wide[unknown])
     done = np.zeros(len(way.ends), bool)
     z, p, good = way.states(todo, 0.5 * (low + high)[todo])
@@ -302,17 +279,48 @@ def _locate_changes(
     return done, _vertices(way.fabric, *own, z[good], p[good])
 
 
-def _enclose(cuts: Float[np.ndarray, "n cuts"], shares: Float[np.ndarray, "n k"]) -> ItemValues:
-    """Put the inner cuts of edges on both sides of the first known share inside; the shares."""
-    shares = np.column_stack([shares, np.full(len(cuts), np.nan)])
-    low, high = cuts[:, :1] + LOCATED, cuts[:, -1:] - LOCATED
+def _compare(
+    preference: Preference,
+    way: "_Straight",
+    wide: Items,
+    cuts: Float[np.ndarray, "n cuts"],
+    first: ItemFlags,
+) -> tuple[Bool[np.ndarray, "n inner"], Bool[np.ndarray, "n inner"]]:
+    """At which inner cuts of edges states are known, and where they are preferred as at the start.
+
+    Cuts at the ends of edges are those that some have less than others.
+    """
+    at = cuts[:, 1:-1]
+    row, column = np.nonzero((at > cuts[:, :1]) & (at < cuts[:, -1:]))
+    z, p, found = way.states(wide[row], at[row, column])
+    good, same = np.ones(at.shape, bool), np.zeros(at.shape, bool)
+    good[row, column] = found
+    row, column = row[found], column[found]
+    same[row, column] = preference.prefers(z[found], p[found]) == first[row]
+    return good, same
+
+
+def _enclose(
+    span: Float[np.ndarray, "n 2"], shares: Float[np.ndarray, "n k"]
+) -> tuple[Float[np.ndarray, "n cuts"], ItemValues]:
+    """Cuts on both sides of the first known share inside each edge; and these shares.
+
+    Edges without one are divided ever more finely towards their ends: most changes that no rule
+    knows lie next to cusps.
+    """
+    shares = np.column_stack([shares, np.full(len(span), np.nan)])
+    low, high = span[:, :1] + LOCATED, span[:, 1:] - LOCATED
     shares[~((shares > low) & (shares < high))] = np.nan
-    share = shares[np.arange(len(cuts)), np.isfinite(shares).argmax(axis=1)]
-    gap = np.abs(np.column_stack([shares, cuts[:, [0, -1]]]) - share[:, None])
+    share = shares[np.arange(len(span)), np.isfinite(shares).argmax(axis=1)]
+    gap = np.abs(np.column_stack([shares, span]) - share[:, None])
     room = np.minimum(ASIDE, APART * np.where(gap > LOCATED, gap, np.inf).min(axis=1))
     known = np.isfinite(share)
-    cuts[known, 1], cuts[known, -2] = (share - room)[known], (share + room)[known]
-    return np.asarray(share)
+    inner = GRADED if 0 < np.count_nonzero(~known) * len(GRADED) <= BATCH else GRADED[[0, -1]]
+    parts = np.concatenate([[0.0], inner, [1.0]])
+    cuts = span[:, :1] + np.diff(span, axis=1) * parts
+    cuts[known, 1:] = span[known, 1:]
+    cuts[known, 1], cuts[known, 2] = (share - room)[known], (share + room)[known]
+    return cuts, np.asarray(share)
 
 
 @dataclass(frozen=True)
@@ -332,6 +340,12 @@ class _Straight:
         """Which ends lie on folds."""
         return on_fold(self.fabric.vertices.kinds[self.ends])
 
+    @cached_property
+    def _bent(self) -> ItemFlags:
+        """Which edges lie on folds or constraints."""
+        curves = FacetMark.CAP | FacetMark.FOLD
+        return np.asarray((self.marks & curves != 0) | self._folded.all(axis=1))
+
     def changes(
         self, preference: Preference, lanes: Items, span: Float[np.ndarray, "n 2"], first: ItemFlags
     ) -> Float[np.ndarray, "n k"]:
@@ -339,6 +353,8 @@ class _Straight:
 
         `first`: at which of the two shares the states are preferred.
         """
+        at_fold = self._folded[lanes] & ~self._bent[lanes, None] & (span == np.arange(2.0))
+        span = np.where(at_fold, np.clip(span, OFF_FOLD, 1.0 - OFF_FOLD), span)
         start, stop = np.where(first, span.T[::-1], span.T)
         ends = [self.states(lanes, share) for share in (start, stop)]
         good = np.flatnonzero(ends[0][2] & ends[1][2])
@@ -358,8 +374,7 @@ class _Straight:
         weights[some] = root_weights(weights[some], folded[some])
         z = np.einsum("nk,nki->ni", weights, store.z[ends])
         good = np.zeros(len(lanes), bool)
-        bent = (marks & (FacetMark.CAP | FacetMark.FOLD) != 0) | folded.all(axis=1)
-        plain = np.flatnonzero(~bent)
+        plain = np.flatnonzero(~self._bent[lanes])
         structure = self.fabric.setting.structure
         z[plain], good[plain], index = exact_states(structure, z[plain], p[plain])
         good[plain] &= index == self.index[lanes[plain]]

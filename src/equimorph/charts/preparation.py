@@ -6,13 +6,15 @@ import numpy as np
 
 from equimorph.arrays import Bool, Facets, Float, Int, ItemFlags, Items, Pairs, VertexNumbers
 from equimorph.manifold import EquilibriumSet
-from equimorph.manifold.complex.kept_sets import kept
-from equimorph.manifold.complex.marked_complex import Fabric, fabric_of
+from equimorph.manifold.complex.excerpts import excerpt_of
+from equimorph.manifold.complex.kept_tables import kept
+from equimorph.manifold.complex.marked_complex import Fabric
 from equimorph.manifold.geometry.points import VertexKind, on_fold
 from equimorph.manifold.geometry.simplices import volumes
 from equimorph.manifold.geometry.topology import (
     Adjacency,
     adjacency,
+    count_corners,
     cut_at_crossings,
     facets_of,
     flags_of,
@@ -21,7 +23,7 @@ from equimorph.manifold.geometry.topology import (
     pieces,
 )
 from equimorph.manifold.queries.cusps import cusps_on_edges
-from equimorph.manifold.queries.levels import part_of
+from equimorph.manifold.queries.levels import whole_set
 
 ROUNDS = 6
 """Most rounds of flips."""
@@ -29,8 +31,11 @@ ROUNDS = 6
 
 def cut_along_crossings(eset: EquilibriumSet) -> EquilibriumSet:
     """A set cut along its crossings, which become boundaries; a set without crossings as it is."""
-    if not eset.crossings:
-        return eset
+    return _cut_along_crossings(eset) if eset.crossings else eset
+
+
+@kept
+def _cut_along_crossings(eset: EquilibriumSet) -> EquilibriumSet:
     crossings, folds = (
         facets_of(curves, len(eset.names)) for curves in (eset.crossings, eset.folds)
     )
@@ -92,11 +97,10 @@ def with_cusp_vertices(eset: EquilibriumSet) -> EquilibriumSet:
 
 @kept
 def _with_cusps(eset: EquilibriumSet) -> EquilibriumSet | None:
-    fabric, cusps = add_cusp_vertices(fabric_of(eset, on_fold(eset.kinds)))
-    if len(cusps) == 0:
-        return None
-    nothing = np.zeros(len(fabric.vertices), bool)
-    return part_of(eset, fabric, np.ones(len(fabric.cells), bool), nothing, 0)
+    folded = on_fold(eset.kinds)
+    excerpt = excerpt_of(eset, count_corners(folded, eset.cells) >= len(eset.names), folded)
+    fabric, cusps = add_cusp_vertices(excerpt.fabric)
+    return whole_set(excerpt.put_back(fabric)) if len(cusps) else None
 
 
 def flip_inverted_triangles(

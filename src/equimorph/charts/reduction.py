@@ -21,6 +21,7 @@ from equimorph.charts.preparation import cut_along_crossings, with_cusp_vertices
 from equimorph.charts.rules import Rule, Scores, rule_of
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
+from equimorph.manifold.complex.kept_tables import from_cache
 from equimorph.model import Constraint, Descriptor
 from equimorph.structures import States
 from equimorph.tables import html_table
@@ -84,8 +85,7 @@ class Reduction(Chart):
     @cached_property
     def preference(self) -> Preference:
         """The rule, ready for the set."""
-        cells = Cells(self.whole, self.coordinates, self.among)
-        return Preference(cells, self.rule.on(self.whole))
+        return Preference(_candidates(self.whole, self.among), self.rule.on(self.whole))
 
     @cached_property
     def cells(self) -> Cells:
@@ -163,10 +163,20 @@ def reduce(
     among = np.flatnonzero((eset.cell_index == 0) | (not stable))
     if len(among) == 0:
         raise InputError("`eset` must have stable states; got none. Pass stable=False.")
-    coordinates = coordinates_of(eset, eset.names)
-    preference = Preference(Cells(eset, coordinates, among), rule.on(eset))
+    cells = _candidates(eset, among)
+    preference = Preference(cells, rule.on(eset))
     chosen, cut, lost = preferred_part(preference)
     if len(chosen.cells) == 0:
         raise InputError(f"`prefer` must prefer some states of the set; got {rule}.")
-    own = Cells(chosen, coordinates, np.arange(len(chosen.cells)), cut)
+    own = Cells(chosen, cells.coordinates, np.arange(len(chosen.cells)), cut)
     return Reduction(chosen, eset, rule, among, cut, barriers_of(own, preference), lost)
+
+
+def _candidates(eset: EquilibriumSet, among: Int[np.ndarray, " own"]) -> Cells:
+    """Cells among which rules choose, with tables that are kept with the set."""
+    stable = len(among) < len(eset.cells)
+    return from_cache(
+        eset,
+        ("candidates", stable),
+        lambda: Cells(eset, coordinates_of(eset, eset.names), among),
+    )

@@ -12,6 +12,7 @@ from equimorph.arrays import Bool, Float, Parameters, Points
 from equimorph.charts.location import Found
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
+from equimorph.manifold.complex.kept_tables import from_cache, places_of
 from equimorph.manifold.geometry.setting import embed
 from equimorph.model import Descriptor, Rebuilt, remember_call
 from equimorph.structures import State, States
@@ -189,8 +190,7 @@ def _distance_from(eset: EquilibriumSet, stratum: int) -> Callable[[Found], Scor
             f"`nearest` must name one of {len(eset.strata)} strata, from 0 on; got {stratum!r}."
         )
     setting = eset.setting
-    used = np.unique(eset.cells[eset.stratum == stratum])
-    tree = cKDTree(embed(setting, eset.points.z[used], eset.points.p[used]))
+    tree = from_cache(eset, ("tree", stratum), lambda: _tree(eset, stratum))
 
     def score(found: Found) -> Scores:
         distance = tree.query(embed(setting, found.states.z, found.states.p))[0]
@@ -198,3 +198,8 @@ def _distance_from(eset: EquilibriumSet, stratum: int) -> Callable[[Found], Scor
         return np.where(own, 0.0, distance)
 
     return score
+
+
+def _tree(eset: EquilibriumSet, stratum: int) -> cKDTree:
+    """The vertices of a stratum in the metric."""
+    return cKDTree(places_of(eset)[np.unique(eset.cells[eset.stratum == stratum])])

@@ -9,7 +9,7 @@ from equimorph.arrays import Int, Values
 from equimorph.control.likely_loads import REACH, Bundles, LikelyLoads, move_states, positions
 from equimorph.equilibria import TraceOptions
 from equimorph.manifold import EquilibriumSet, equilibrium_set
-from equimorph.manifold.complex.kept_sets import from_cache
+from equimorph.manifold.complex.kept_tables import from_cache
 from equimorph.manifold.geometry.topology import labels
 from equimorph.model import names_of
 from equimorph.structures import States, join_states

@@ -96,9 +96,10 @@ def corners_of(
     InputError
         As for `worst_over`.
     """
-    found = []
-    for corner in _corners(structure, offsets)[1:]:
-        ray = _Ray(structure, descriptor, corner)
+    corners = _corners(structure, offsets)[1:]
+    rays, found = _Rays(structure, corners), []
+    for number, corner in enumerate(corners):
+        ray = _Ray(rays, number, descriptor)
         own = {name: float(corner[position(structure.parameters, name)]) for name in offsets}
         text = ", ".join(f"{name} {size:+.9g}" for name, size in own.items())
         room = Descriptor(f"room({text})", "1", ray.room, "room", structure.signature)
@@ -128,33 +129,69 @@ def _corners(
 
 
 @dataclass(frozen=True)
-class _Ray:
-    """The straight way from states to a corner and as far again."""
+class _RayEnds:
+    """Where stability is lost on the straight ways from states to corners and as far again."""
+
+    share: Float[np.ndarray, "lanes corners"]
+    z: Float[np.ndarray, "lanes corners size"]
+    p: Float[np.ndarray, "lanes corners parameters"]
+
+
+@dataclass
+class _Rays:
+    """The straight ways from states to all corners of a box and as far again.
+
+    Those from the last states are remembered: constraints of all corners ask for the same ones, and
+    few paths take nearly as long as many.
+    """
 
     structure: Structure
+    corners: Float[np.ndarray, "corners parameters"]
+    last: tuple[Lanes, Parameters, _RayEnds] | None = None
+
+    def ends(self, z: Lanes, p: Parameters) -> _RayEnds:
+        """Shares of the ways, −1 from unstable states, with the states there."""
+        last = self.last
+        if last is not None and np.array_equal(last[0], z) and np.array_equal(last[1], p):
+            return last[2]
+        found = self._ends(z, p)
+        self.last = z.copy(), p.copy(), found
+        return found
+
+    def _ends(self, z: Lanes, p: Parameters) -> _RayEnds:
+        many = len(self.corners)
+        polished, stable = _stable_states(self.structure, z, p)
+        share, lanes = np.full((len(z), many), -1.0), np.flatnonzero(stable)
+        end, at = (np.repeat(each[:, None], many, axis=1) for each in (polished, p))
+        if len(lanes):
+            velocity = np.tile(TWICE * self.corners, (len(lanes), 1))
+            start, begin = (np.repeat(each[lanes], many, axis=0) for each in (polished, p))
+            line = ParameterLine(self.structure, begin, velocity)
+            ended = trace(line, start, (), TraceOptions(record=False))
+            moved = ended.t[:, None] * velocity
+            share[lanes] = TWICE * ended.t.reshape(-1, many)
+            end[lanes] = ended.z.reshape(len(lanes), many, -1)
+            at[lanes] += moved.reshape(len(lanes), many, -1)
+        return _RayEnds(share, end, at)
+
+
+@dataclass(frozen=True)
+class _Ray:
+    """One of these ways, and a descriptor of the states on it."""
+
+    rays: _Rays
+    corner: int
     descriptor: Descriptor
-    corner: Float[np.ndarray, " parameters"]
 
     def room(self, z: Lanes, p: Parameters) -> Values:
         """Share of the way at which stability is lost; −1 for unstable states."""
-        return self._end(z, p)[0]
+        return self.rays.ends(z, p).share[:, self.corner]
 
     def limit(self, z: Lanes, p: Parameters) -> Values:
         """The descriptor there."""
-        share, end, at = self._end(z, p)
-        return np.where(share >= 0.0, self.descriptor.function(end, at), np.inf)
-
-    def _end(self, z: Lanes, p: Parameters) -> tuple[Values, Lanes, Parameters]:
-        share = np.full(len(z), -1.0)
-        end, stable = _stable_states(self.structure, z, p)
-        at, lanes = p.copy(), np.flatnonzero(stable)
-        if len(lanes):
-            velocity = np.tile(TWICE * self.corner, (len(lanes), 1))
-            line = ParameterLine(self.structure, p[lanes], velocity)
-            ended = trace(line, end[lanes], (), TraceOptions(record=False))
-            share[lanes], end[lanes] = TWICE * ended.t, ended.z
-            at[lanes] += ended.t[:, None] * velocity
-        return share, end, at
+        ends, k = self.rays.ends(z, p), self.corner
+        states = (np.ascontiguousarray(each[:, k]) for each in (ends.z, ends.p))
+        return np.where(ends.share[:, k] >= 0.0, self.descriptor.function(*states), np.inf)
 
 
 @check_arguments

@@ -6,7 +6,7 @@ import numpy as np
 
 from equimorph.arrays import Bool, Float, Int
 from equimorph.manifold import EquilibriumSet, part, restricted
-from equimorph.manifold.complex.kept_sets import from_cache, kept
+from equimorph.manifold.complex.kept_tables import from_cache, kept
 from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.geometry.topology import faces_of
 from equimorph.manifold.queries.locate import cell_of, pieces_of

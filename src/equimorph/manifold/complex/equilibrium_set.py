@@ -1,7 +1,7 @@
 """The equilibrium set over one to three parameters: a simplicial complex of exact states."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from enum import StrEnum
 from functools import cached_property
 
@@ -115,6 +115,10 @@ class EquilibriumSet(Tabular):
     grid_vertex: VertexNumbers
     """Vertex of `mesh` below each vertex of the complex, −1 for those not over the grid."""
     crossings: tuple[Int[np.ndarray, "..."], ...] = ()
+
+    def __getstate__(self) -> dict[str, object]:
+        """Return what copies and pickles keep: no tables that were computed of the set."""
+        return {each.name: getattr(self, each.name) for each in fields(self)}
 
     def __repr__(self) -> str:
         """Box, size and whether the audit is clean."""

@@ -1,6 +1,4 @@
-"""Sets in journals: the question that a set answers, and the set as one entry; tables of sets.
-
-Tables of a set for several tasks are computed once, and forgotten with the set.
+"""Sets in journals: the question that a set answers, and the set as one entry.
 
 See docs/decisions.md, "Journals keep whole sets".
 """
@@ -8,11 +6,9 @@ See docs/decisions.md, "Journals keep whole sets".
 import json
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, astuple, dataclass, fields
-from functools import wraps
 from hashlib import sha256
 from importlib.metadata import version
-from typing import Any, TypeVar
-from weakref import WeakKeyDictionary
+from typing import Any
 
 import numpy as np
 
@@ -38,37 +34,6 @@ from equimorph.model import (
     recall_or_compute,
 )
 from equimorph.structures import States, Structure
-
-_KEPT: WeakKeyDictionary[EquilibriumSet, dict[Any, Any]] = WeakKeyDictionary()
-
-Table = TypeVar("Table")
-
-
-def from_cache(eset: EquilibriumSet, key: Any, compute: Callable[[], Any]) -> Any:
-    """Return what was computed before for a set, or compute it.
-
-    It must not hold the set itself, which would then never be forgotten.
-    """
-    known = _KEPT.setdefault(eset, {})
-    if key not in known:
-        known[key] = compute()
-    return known[key]
-
-
-def kept(compute: Callable[[EquilibriumSet], Table]) -> Callable[[EquilibriumSet], Table]:
-    """A function of a set, computed once for each set; see `from_cache`.
-
-    An array is the same one each time, which nobody may change.
-    """
-
-    @wraps(compute)
-    def table(eset: EquilibriumSet) -> Table:
-        found: Table = from_cache(eset, compute, lambda: compute(eset))
-        if isinstance(found, np.ndarray):
-            found.flags.writeable = False
-        return found
-
-    return table
 
 
 @dataclass(frozen=True)

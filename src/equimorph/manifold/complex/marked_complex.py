@@ -16,35 +16,23 @@ from equimorph.arrays import (
     CellFlags,
     CellNumbers,
     Cells,
-    Facets,
     Float,
     Int,
     ItemFlags,
-    Items,
     Triples,
-    VertexFlags,
     VertexNumbers,
 )
 from equimorph.linalg.lanes import results_of
 from equimorph.manifold.complex.description import Complex
-from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.manifold.complex.vertices import (
     Vertices,
-    among_unframed,
-    on_constraints,
-    vertices_of,
 )
 from equimorph.manifold.geometry.kernels import cut_rows, look_back, number_edges, square_sides
 from equimorph.manifold.geometry.points import VertexKind
-from equimorph.manifold.geometry.setting import Setting, embed
-from equimorph.manifold.geometry.tangents import Ends, best_corners
+from equimorph.manifold.geometry.setting import Setting
+from equimorph.manifold.geometry.tangents import Ends
 from equimorph.manifold.geometry.topology import (
-    adjacency,
-    cut_at_crossings,
-    facets_of,
-    flags_of,
     keys_of,
-    senses,
 )
 from equimorph.structures import States
 
@@ -72,8 +60,6 @@ TRIANGLES, TETRAHEDRA = 2, 3
 """Dimension of their cells."""
 AT_ONCE = 4096
 """Number of cells or edges in one task of a thread."""
-ON_BOX = 1e-9
-"""Distance from a side of the box, relative to the width of the box, of points that lie on it."""
 
 
 @dataclass(frozen=True)
@@ -201,12 +187,7 @@ class Fabric:
     @property
     def points(self) -> VertexNumbers:
         """For each vertex the first one that is the same point."""
-        shared = self.vertices.shared
-        own = np.arange(len(shared))
-        copies = np.flatnonzero(shared >= 0)
-        _, first, inverse = np.unique(shared[copies], return_index=True, return_inverse=True)
-        own[copies] = copies[first[inverse]]
-        return own
+        return first_copies_of(self.vertices.shared)
 
     @property
     def numbers(self) -> VertexNumbers:
@@ -239,6 +220,16 @@ class Fabric:
         )
 
 
+def first_copies_of(shared: VertexNumbers) -> VertexNumbers:
+    """For each vertex the first one that is the same point, by their common numbers."""
+    own = np.arange(len(shared))
+    copies = np.flatnonzero(shared >= 0)
+    if len(copies):
+        _, first, inverse = np.unique(shared[copies], return_index=True, return_inverse=True)
+        own[copies] = copies[first[inverse]]
+    return own
+
+
 def squared_sides(
     place: Float[np.ndarray, "V coordinates"], cells: Int[np.ndarray, "n corners"]
 ) -> Float[np.ndarray, "n sides"]:
@@ -257,72 +248,6 @@ def shares(count: int) -> list[tuple[int, int]]:
 def held_parameters(mark: int, dimension: int) -> list[int]:
     """Free parameters that sides of the box hold."""
     return [k for k in range(dimension) if mark & (3 * FacetMark.SIDE << 2 * k)]
-
-
-def fabric_of(eset: EquilibriumSet, framed: VertexFlags | None = None) -> Fabric:
-    """Return a set as a fabric: its sheets are parted where they cross.
-
-    Frames take most of the time; only vertices at the ends of edges that are cut need them. Sets
-    whose sheets cross have them everywhere: a cut of one sheet continues on the other.
-
-    framed: vertices at which frames are needed; all if None.
-    """
-    setting, d = eset.setting, len(eset.names)
-    crossings, folds = (facets_of(pieces, d) for pieces in (eset.crossings, eset.folds))
-    cells, origin = cut_at_crossings(eset.cells, crossings, len(eset.points))
-    cells = cells.copy()
-    z, p = eset.points.z[origin], eset.points.p[origin]
-    whole = adjacency(cells)
-    sense = senses(cells, eset.cell_index, eset.coordinates[origin], whole)
-    known = {name: getattr(eset, name)[origin] for name in ("kinds", "index", "grid_vertex")}
-    known |= {"z": z, "p": p}
-    if framed is None or (eset.crossings and framed.any()):
-        framed = np.ones(len(eset.points), bool)
-    some = framed[origin]
-    rows = best_corners(setting, z, p, cells, sense.signs, some)
-    own = vertices_of(setting, rows=rows, **{name: each[some] for name, each in known.items()})
-    vertices = among_unframed(own, some, embed(setting, z, p), known)
-    common = np.where(np.isin(origin, crossings), origin, -1)
-    vertices = replace(vertices, shared=common)
-    place = origin[whole.facets]
-    folded, crossed = (flags_of(place, each) for each in (folds, crossings))
-    outer = whole.counts == 1
-    marks = np.where(folded, FacetMark.FOLD, 0) | np.where(crossed, FacetMark.CROSSING, 0)
-    outer_marks = _outer_marks(setting, eset, place[outer])
-    # of parts of sets folds are boundaries, too
-    marks[outer] |= np.where(marks[outer] > 0, outer_marks & ~FacetMark.HOLE, outer_marks)
-    marked = marks > 0
-    box = np.stack([eset.box.lower, eset.box.upper])
-    if d >= TRIANGLES:
-        against = sense.signs < 0
-        cells[against, -2:] = cells[against, :-3:-1]
-    squared = squared_sides(vertices.place, cells)
-    facets = (whole.facets[marked], marks[marked])
-    return Fabric(setting, box, vertices, cells, eset.cell_index, *facets, squared)
-
-
-def ends_of_changes(cells: Cells, values: Float[np.ndarray, " V"]) -> VertexFlags:
-    """Vertices of the cells in which values at vertices have different signs."""
-    own, out = values[cells], np.zeros(len(values), bool)
-    out[cells[(own.min(axis=1) < 0.0) & (own.max(axis=1) > 0.0)]] = True
-    return out
-
-
-def _outer_marks(setting: Setting, eset: EquilibriumSet, facets: Facets) -> Items:
-    """On what facets of the boundary lie: on a side of the box, else on the constraint."""
-    places = eset.coordinates[facets]
-    size = eset.box.upper - eset.box.lower
-    marks = np.zeros(len(facets), int)
-    for side, bound in enumerate((eset.box.lower, eset.box.upper)):
-        on = (np.abs(places - bound) <= ON_BOX * size).all(axis=1)
-        for k in range(len(size)):
-            marks |= np.where(on[:, k], FacetMark.SIDE << (2 * k + side), 0)
-    capped = np.isin(eset.kinds, (VertexKind.CAP, VertexKind.CORNER))
-    met = np.flatnonzero(eset.kinds == VertexKind.CROSSING)
-    capped[met] = on_constraints(setting, eset.points.z[met], eset.points.p[met])
-    return np.where(
-        marks > 0, marks, np.where(capped[facets].all(axis=1), FacetMark.CAP, FacetMark.HOLE)
-    )
 
 
 def _bisect(

@@ -195,22 +195,22 @@ def chains(pairs: Pairs) -> list[Int[np.ndarray, "..."]]:
     """Polylines along edges, split where other than two meet; closed ones repeat the start."""
     if len(pairs) == 0:
         return []
+    ends = pairs.tolist()
     around: dict[int, list[int]] = {}
-    for number, (a, b) in enumerate(pairs.tolist()):
+    for number, (a, b) in enumerate(ends):
         around.setdefault(a, []).append(number)
         around.setdefault(b, []).append(number)
-    used = np.zeros(len(pairs), bool)
-    out = []
+    used, out = [False] * len(ends), []
     starts = [v for v, edges in around.items() if len(edges) != 2]
-    for start in [*starts, *around]:
+    for start, alone in [*((v, False) for v in starts), *((v, True) for v in around)]:
         for number in around[start]:
-            if used[number] or (start not in starts and used[around[start][0]]):
+            if used[number] or (alone and used[around[start][0]]):
                 continue
             line, at, edge = [start], start, number
             while True:
                 used[edge] = True
-                a, b = pairs[edge]
-                at = int(b if at == a else a)
+                a, b = ends[edge]
+                at = b if at == a else a
                 line.append(at)
                 onward = [e for e in around[at] if not used[e]]
                 if len(around[at]) != 2 or not onward:

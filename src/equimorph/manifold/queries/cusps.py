@@ -12,7 +12,8 @@ from equimorph.equilibria.settle import lower_index
 from equimorph.errors import InputError
 from equimorph.manifold.complex.cuts import roots
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
-from equimorph.manifold.complex.marked_complex import Fabric, FacetMark, fabric_of
+from equimorph.manifold.complex.excerpts import fabric_of
+from equimorph.manifold.complex.marked_complex import Fabric, FacetMark
 from equimorph.manifold.complex.vertices import Vertices
 from equimorph.manifold.geometry.points import VertexKind, on_fold
 from equimorph.manifold.geometry.setting import Setting, embed

@@ -1,6 +1,6 @@
 """Level sets: exact vertices where a function on the set vanishes, and complexes cut along them."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,7 +10,6 @@ from equimorph.arrays import CellFlags, CellNumbers, Float, Int, ItemFlags, Item
 from equimorph.errors import InputError
 from equimorph.manifold.complex.cuts import (
     ROUND_OFF,
-    Cut,
     Ends,
     Function,
     Values,
@@ -19,12 +18,19 @@ from equimorph.manifold.complex.cuts import (
 )
 from equimorph.manifold.complex.description import describe_again
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
-from equimorph.manifold.complex.marked_complex import Fabric, FacetMark, ends_of_changes, fabric_of
+from equimorph.manifold.complex.excerpts import (
+    Recut,
+    changing_cells,
+    excerpt_of,
+    fabric_of,
+    sheets_of,
+)
+from equimorph.manifold.complex.kept_tables import kept, places_of
+from equimorph.manifold.complex.marked_complex import Fabric
 from equimorph.manifold.complex.vertices import Vertices
-from equimorph.manifold.geometry.points import VertexKind, on_fold
-from equimorph.manifold.geometry.setting import Setting, embed
+from equimorph.manifold.geometry.setting import Setting
 from equimorph.manifold.geometry.tangents import split_step
-from equimorph.manifold.geometry.topology import adjacency, pieces
+from equimorph.manifold.geometry.topology import adjacency, count_corners, pieces
 from equimorph.model import Constraint, Descriptor
 from equimorph.structures import States
 
@@ -55,7 +61,7 @@ def level_set(eset: EquilibriumSet, descriptor: Descriptor, value: float) -> Lev
     InputError
         If `value` is not finite, or what is no descriptor is given.
     """
-    return _level(eset, lambda v: descriptor.function(v.z, v.p) - value)
+    return _level(_cut(eset, lambda v: descriptor.function(v.z, v.p) - value))
 
 
 @check_arguments
@@ -71,7 +77,7 @@ def singular_set(eset: EquilibriumSet, descriptors: Sequence[Descriptor]) -> Lev
         If there is another number of descriptors, or anything but descriptors.
     """
     _check_count(eset, descriptors)
-    return _level(eset, lambda v: jacobian(eset.setting, v, descriptors))
+    return _level(_cut_where_singular(eset, descriptors))
 
 
 def _check_count(eset: EquilibriumSet, descriptors: Sequence[Descriptor]) -> None:
@@ -106,21 +112,33 @@ def divided(eset: EquilibriumSet, descriptors: Sequence[Descriptor]) -> Division
         If there are not as many descriptors as free parameters.
     """
     _check_count(eset, descriptors)
-    fabric = fabric_of(eset)
-    return _divide(eset, _cut(fabric, lambda v: jacobian(fabric.setting, v, descriptors)))
+    return _divide(_cut_where_singular(eset, descriptors))
 
 
 @check_arguments
 def divided_by(eset: EquilibriumSet, constraint: Constraint) -> Division:
     """Cut a set exactly along the bound of a constraint; the side is -1 where it is obeyed."""
-    return _divide(eset, _cut_at_bound(eset, constraint))
+    return _divide(_cut_at_bound(eset, constraint))
 
 
-def _divide(eset: EquilibriumSet, cut: "Cut") -> Division:
-    nothing = np.zeros(len(cut.values), bool)
-    whole = part_of(eset, cut.fabric, np.ones(len(cut.fabric.cells), bool), nothing, cut.lost)
-    side = np.sign(cut.values[cut.fabric.cells].sum(axis=1)).astype(int)
-    on_level, number = np.zeros(len(whole.points), bool), cut.fabric.numbers
+@dataclass(frozen=True, eq=False)
+class Cutting:
+    """A set cut along a level: its cells, values at their vertices, edges that could not be cut."""
+
+    recut: Recut
+    values: Values
+    lost: int
+
+    @property
+    def on_level(self) -> VertexFlags:
+        """Vertices on the level."""
+        return np.asarray(self.values == 0.0)
+
+
+def _divide(cut: Cutting) -> Division:
+    whole = whole_set(cut.recut, cut.lost)
+    side = np.sign(cut.values[cut.recut.cells].sum(axis=1)).astype(int)
+    on_level, number = np.zeros(len(whole.points), bool), cut.recut.numbers
     on_level[number[cut.on_level & (number >= 0)]] = True
     return Division(whole, on_level, side, cut.lost)
 
@@ -150,15 +168,15 @@ def restricted(eset: EquilibriumSet, constraint: Constraint) -> EquilibriumSet:
         If it is no constraint.
     """
     cut = _cut_at_bound(eset, constraint)
-    inside = (cut.values[cut.fabric.cells] <= 0.0).all(axis=1)
+    inside = (cut.values[cut.recut.cells] <= 0.0).all(axis=1)
     constraints = (*eset.constraints, constraint)
     setting = replace(eset.setting, constraints=constraints)
-    return part_of(eset, replace(cut.fabric, setting=setting), inside, cut.on_level, cut.lost)
+    return part_of(cut.recut, inside, cut.on_level, cut.lost, setting)
 
 
 def cell_sizes(eset: EquilibriumSet) -> Float[np.ndarray, " C"]:
     """Lengths, areas or volumes of the cells in the metric of the embedding."""
-    corners = embed(eset.setting, eset.points.z, eset.points.p)[eset.cells]
+    corners = places_of(eset)[eset.cells]
     sides = corners[:, 1:] - corners[:, :1]
     gram = sides @ np.swapaxes(sides, 1, 2)
     share = {1: 1.0, 2: 0.5, 3: 1.0 / 6.0}[len(eset.names)]
@@ -168,30 +186,50 @@ def cell_sizes(eset: EquilibriumSet) -> Float[np.ndarray, " C"]:
 @check_arguments
 def part(eset: EquilibriumSet, cells: CellFlags) -> EquilibriumSet:
     """Selected cells as a set, like the stable ones: ``eset.cell_index == 0``."""
-    fabric = fabric_of(eset, np.zeros(len(eset.points), bool))
-    nothing = np.zeros(len(fabric.vertices), bool)
-    return part_of(eset, fabric, cells, nothing, 0)
+    recut = excerpt_of(eset, np.zeros(len(eset.cells), bool)).put_back()
+    return part_of(recut, cells, np.zeros(len(recut.points), bool), 0)
 
 
-def _level(eset: EquilibriumSet, function: Function) -> Level:
-    cut = _cut(fabric_of(eset), function)
-    store, whole = cut.fabric.vertices, adjacency(cut.fabric.cells)
-    facets = whole.facets[cut.on_level[whole.facets].all(axis=1)]
-    facets = np.unique(np.sort(cut.fabric.points[facets], axis=1), axis=0)
+def _level(cut: Cutting) -> Level:
+    recut, level = cut.recut, cut.on_level
+    d = len(recut.eset.names)
+    whole = adjacency(recut.cells[count_corners(level, recut.cells) >= d])
+    facets = whole.facets[level[whole.facets].all(axis=1)]
+    facets = np.unique(np.sort(recut.points[facets], axis=1), axis=0)
     used, inverse = np.unique(facets, return_inverse=True)
-    states = States(eset.structure, store.z[used], store.p[used])
-    return Level(states, tuple(pieces(inverse.reshape(facets.shape))), cut.lost)
+    found = pieces(inverse.reshape(facets.shape))
+    return Level(recut.states(used), tuple(found), cut.lost)
 
 
-def _cut_at_bound(eset: EquilibriumSet, constraint: Constraint) -> Cut:
-    excess = constraint.excess(eset.points.z, eset.points.p)
-    fabric = fabric_of(eset, ends_of_changes(eset.cells, excess))
-    return _cut(fabric, lambda v: constraint.excess(v.z, v.p))
+def _cut_at_bound(eset: EquilibriumSet, constraint: Constraint) -> Cutting:
+    return _cut(eset, lambda v: constraint.excess(v.z, v.p))
 
 
-def _cut(fabric: Fabric, function: Function) -> Cut:
-    """Put vertices where a function vanishes on edges, until no edge crosses its level."""
-    values = function(fabric.vertices)
+def _cut(eset: EquilibriumSet, function: Callable[[Vertices | States], Values]) -> Cutting:
+    """Cut a set where a function of its states vanishes."""
+    return cut_along(eset, function(eset.points)[sheets_of(eset).origin], function)
+
+
+def _cut_where_singular(eset: EquilibriumSet, descriptors: Sequence[Descriptor]) -> Cutting:
+    """Cut a set where the Jacobian of descriptors is singular."""
+
+    def function(at: Vertices) -> Values:
+        return jacobian(eset.setting, at, descriptors)
+
+    return cut_along(eset, function(framed_vertices(eset)), function)
+
+
+@kept
+def framed_vertices(eset: EquilibriumSet) -> Vertices:
+    """The vertices of a set with tangent frames that are oriented alike."""
+    return fabric_of(eset).vertices
+
+
+def cut_along(eset: EquilibriumSet, values: Values, function: Function) -> Cutting:
+    """Put vertices where a function vanishes on edges of a set, until no edge crosses its level.
+
+    values: of the function at the vertices of the set's sheets.
+    """
     values = np.where(np.abs(values) <= ROUND_OFF * np.abs(values).max(initial=0.0), 0.0, values)
 
     def between(
@@ -199,35 +237,31 @@ def _cut(fabric: Fabric, function: Function) -> Cut:
     ) -> tuple[ItemFlags, Vertices]:
         return roots(fabric, ends, mark, index, known, lambda at, _: function(at))
 
-    return cut_between(fabric, values, between, function)
+    excerpt = excerpt_of(eset, changing_cells(sheets_of(eset).cells, values))
+    if len(excerpt.numbers) == 0:
+        return Cutting(excerpt.put_back(), values, 0)
+    cut = cut_between(excerpt.fabric, values[excerpt.used], between, function)
+    recut = excerpt.put_back(cut.fabric)
+    return Cutting(recut, np.concatenate([values, cut.values[len(excerpt.used) :]]), cut.lost)
+
+
+def whole_set(recut: Recut, lost: int = 0) -> EquilibriumSet:
+    """A set that was cut, with all of its cells; `lost`: how many edges could not be cut."""
+    nothing = np.zeros(len(recut.points), bool)
+    return part_of(recut, np.ones(len(recut.cells), bool), nothing, lost)
 
 
 def part_of(
-    eset: EquilibriumSet, fabric: Fabric, cells: CellFlags, on_level: VertexFlags, lost: int
+    recut: Recut,
+    cells: CellFlags,
+    on_level: VertexFlags,
+    lost: int,
+    setting: Setting | None = None,
 ) -> EquilibriumSet:
-    """Some cells of a fabric as a set; facets on the level lie on a constraint.
+    """Some cells of a set that was cut as a set; facets on the level lie on a constraint.
 
-    `lost`: how many edges could not be cut.
+    `lost`: how many edges could not be cut; setting: with further constraints, if there are any.
     """
-    whole = adjacency(fabric.cells[cells]) if cells.any() else None
-    facets, marks = fabric.facets, fabric.marks
-    if whole is not None:
-        outer = whole.facets[whole.counts == 1]
-        capped = outer[on_level[outer].all(axis=1)]
-        facets = np.concatenate([facets, capped])
-        marks = np.concatenate([marks, np.full(len(capped), FacetMark.CAP)])
-    kinds = fabric.vertices.kinds.copy()
-    plain = on_level & (kinds != VertexKind.CROSSING)
-    kinds[plain] = np.where(
-        on_fold(kinds[plain]),
-        VertexKind.CORNER,
-        VertexKind.CAP,
-    )
-    fabric = replace(
-        fabric.only(cells),
-        vertices=replace(fabric.vertices, kinds=kinds),
-        facets=facets[(marks & FacetMark.HOLE) == 0],
-        marks=marks[(marks & FacetMark.HOLE) == 0],
-    )
-    out = describe_again(eset, fabric.complex(), fabric.setting)
+    eset = recut.eset
+    out = describe_again(eset, recut.complex(cells, on_level), setting or eset.setting)
     return replace(out, audit=replace(out.audit, unrefined=out.audit.unrefined + lost))

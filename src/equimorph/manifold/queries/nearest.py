@@ -7,7 +7,7 @@ import numpy as np
 from equimorph.arrays import Flags, Float, Int, Items, Lanes, Pairs, Parameters, Rows, Some
 from equimorph.columns import Columns
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
-from equimorph.manifold.complex.kept_sets import kept
+from equimorph.manifold.complex.kept_tables import kept
 from equimorph.manifold.geometry.exact_points import Aim, correct_points
 from equimorph.manifold.geometry.setting import Setting, embed
 from equimorph.manifold.geometry.tangents import (

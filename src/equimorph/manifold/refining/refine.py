@@ -19,8 +19,9 @@ from equimorph.arrays import CellFlags, EdgeFlags
 from equimorph.manifold.complex.audit import Audit
 from equimorph.manifold.complex.description import describe_again
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
+from equimorph.manifold.complex.excerpts import fabric_of
 from equimorph.manifold.complex.kept_sets import question_of_refinement, recall_set
-from equimorph.manifold.complex.marked_complex import CURVES, Fabric, FacetMark, fabric_of
+from equimorph.manifold.complex.marked_complex import CURVES, Fabric, FacetMark
 from equimorph.manifold.queries.cusps import with_cusps_beside
 from equimorph.manifold.refining.bisect import Patch, bisect, part_sheets, patch_around, settle
 from equimorph.manifold.refining.deviation import Edges, Memory, near_lost, update_edges

@@ -8,6 +8,7 @@ import numpy as np
 
 from equimorph.arrays import Flags, Float, Lanes, Nodal, Parameters, Values, Velocity
 from equimorph.errors import InputError
+from equimorph.linalg import multiply
 from equimorph.linalg.condensed import PIVOT_GUARD
 from equimorph.linalg.intervals import Interval
 from equimorph.linalg.lanes import over_lanes
@@ -208,8 +209,8 @@ class PlanarMechanics(RodMechanics):
 
     def tail(self, z: Lanes, p: Parameters) -> Values:
         """Largest of the two highest Legendre coefficients of θ in all elements."""
-        tail = self.mesh.highest @ self.nodal_angles(z, p).T
-        return np.asarray(np.abs(tail, out=tail).max(axis=0))
+        tail = multiply(self.nodal_angles(z, p), self.mesh.highest.T)
+        return np.asarray(np.abs(tail, out=tail).max(axis=1))
 
 
 SAMPLES = np.linspace(0.0, 1.0, 25)

@@ -26,6 +26,9 @@ STALLED = 1e-6
 """Length of a step below which a merit that no longer falls is round-off."""
 MERGED = 0.01
 """Distance in the metric and scaled parameters below which two lanes are one."""
+CREEPING, CLOSE = 6, 1e-3
+"""Rounds one after the other in which only a part of so short a step lowers the merit, after which
+a lane stops: at kinks of constraints it would go on like this."""
 PENALTY = 2.0
 """Of a violated constraint, relative to its multiplier."""
 FLAT = 1e-4
@@ -128,10 +131,17 @@ class _Lane:
     point: SetPoints
     reach: float = LONGEST
     penalty: float = 1.0
+    creeping: int = 0
     answer: QuadraticStep | None = None
     done: CriticalPoint | None = None
     best: SetPoints | None = None
     least: float = np.inf
+
+    def go_on(self, whole: bool, length: float) -> None:
+        """Note whether the whole step was made, and its length."""
+        self.creeping = 0 if whole or length > CLOSE else self.creeping + 1
+        if whole:
+            self.reach = min(LONGEST, 2.0 * self.reach)
 
 
 def descend(
@@ -143,7 +153,11 @@ def descend(
     """
     lanes = [_Lane(starts.take(np.array([k]))) for k in range(len(starts))]
     for _ in range(rounds):
-        todo = [lane for lane in lanes if lane.done is None and lane.reach > 0.0]
+        todo = [
+            lane
+            for lane in lanes
+            if lane.done is None and lane.reach > 0.0 and lane.creeping < CREEPING
+        ]
         if not todo:
             break
         here = SetPoints.concatenate([lane.point for lane in todo])
@@ -240,12 +254,12 @@ def _advance(
             own = PENALTY * max(float(answer.multipliers.sum()), _steepness(at.expansion, k))
             lane.penalty = max(lane.penalty, own)
             steps[k] = answer
-    waiting, share = list(steps), 1.0
-    for _ in range(HALVINGS):
+    waiting = list(steps)
+    # few steps take nearly as long as many: all shorter ones are tried at once
+    for shares in np.split(0.5 ** np.arange(HALVINGS), [1]):
         if not waiting:
             return
-        waiting = _try_steps(programme, todo, at, {k: steps[k].step for k in waiting}, share)
-        share *= 0.5
+        waiting = _try_steps(programme, todo, at, {k: steps[k].step for k in waiting}, shares)
     for k in waiting:
         small = bool(np.linalg.norm(steps[k].step) < STALLED)
         todo[k].done = at.minimum(k, steps[k], small)
@@ -266,24 +280,28 @@ def _try_steps(
     todo: list[_Lane],
     at: Iterate,
     steps: dict[int, Float[np.ndarray, " d"]],
-    share: float,
+    shares: Float[np.ndarray, " shares"],
 ) -> list[int]:
-    """Make a share of the steps of some lanes; those whose merit does not fall are returned."""
-    lanes = np.array(list(steps))
+    """Make the largest share of the steps of some lanes with which the merit falls.
+
+    Lanes whose merit does not fall are returned.
+    """
+    count = len(shares)
+    lanes = np.repeat(list(steps), count)
     here, expansion = at.points.take(lanes), at.expansion
-    moves = share * np.stack(list(steps.values()))
+    moves = (np.stack(list(steps.values()))[:, None] * shares[:, None]).reshape(len(lanes), -1)
     guess = step_along(programme.setting, here, at.frames[lanes], moves)
     there, found = project_onto_set(programme.setting, *guess, here.rows)
     value = programme.objective.values(there.z, there.p)
     excess = np.maximum(programme.excess(there.z, there.p), 0.0).sum(axis=1)
     left = []
     for i, k in enumerate(steps):
-        lane = todo[k]
+        lane, own = todo[k], np.arange(i * count, (i + 1) * count)
         before = expansion.f[k].max() + lane.penalty * np.maximum(expansion.g[k], 0.0).sum()
-        after = value[i] + lane.penalty * excess[i]
-        if found[i] and after < before:
-            lane.point = there.take(np.array([i]))
-            lane.reach = min(LONGEST, 2.0 * lane.reach) if share == 1.0 else lane.reach
+        falls = own[found[own] & (value[own] + lane.penalty * excess[own] < before)]
+        if len(falls):
+            lane.point = there.take(falls[:1])
+            lane.go_on(shares[0] == 1.0, float(np.linalg.norm(steps[k])))
         else:
             left.append(k)
     return left

@@ -14,7 +14,7 @@ import numpy as np
 from equimorph.arrays import Float, ItemFlags, Items, Some
 from equimorph.equilibria import settle
 from equimorph.manifold import EquilibriumSet
-from equimorph.manifold.complex.kept_sets import from_cache
+from equimorph.manifold.complex.kept_tables import from_cache
 from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.queries.nearest import SetPoints, cells_around, points_at_vertices
 from equimorph.model import Constraint

@@ -16,7 +16,7 @@ from scipy.sparse.csgraph import breadth_first_order, minimum_spanning_tree
 
 from equimorph.arrays import Facets, Float, Int, Items, ItemValues, Pairs, Some
 from equimorph.manifold import EquilibriumSet
-from equimorph.manifold.complex.kept_sets import from_cache
+from equimorph.manifold.complex.kept_tables import from_cache
 from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.topology import adjacency
 from equimorph.model import Constraint

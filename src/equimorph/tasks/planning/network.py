@@ -13,7 +13,7 @@ from equimorph.equilibria.soft_modes import metric_length
 from equimorph.equilibria.trace import Traces, trace
 from equimorph.equilibria.trace_options import EventCode
 from equimorph.manifold import EquilibriumSet
-from equimorph.manifold.complex.kept_sets import from_cache
+from equimorph.manifold.complex.kept_tables import from_cache
 from equimorph.manifold.geometry.topology import faces_of
 from equimorph.model import Constraint, are_feasible, ease
 from equimorph.structures import State, States, Structure, join_states

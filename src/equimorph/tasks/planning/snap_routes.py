@@ -11,7 +11,7 @@ from scipy.sparse.csgraph import dijkstra
 from equimorph.arrays import Float, Int
 from equimorph.equilibria import Landing, Path, lift, snap_landing
 from equimorph.manifold import EquilibriumSet, Snap, snap_graph
-from equimorph.manifold.complex.kept_sets import from_cache
+from equimorph.manifold.complex.kept_tables import from_cache
 from equimorph.model import Descriptor
 from equimorph.structures import State, States, join_states
 from equimorph.tasks.distances import distance

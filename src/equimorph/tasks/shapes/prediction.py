@@ -2,18 +2,20 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from equimorph.arrays import Bool, Edges, Float, Int, Rows, Some
+from equimorph.arrays import Bool, Edges, Float, Int, Items, Rows, Some
 from equimorph.equilibria.point_conditions import Values
 from equimorph.equilibria.settle import Guards, Settled, embedded_planes, free_directions, settle
 from equimorph.manifold import EquilibriumSet, Level, level_set
-from equimorph.manifold.complex.kept_sets import from_cache
+from equimorph.manifold.complex.kept_tables import from_cache, places_of
 from equimorph.manifold.geometry.setting import Setting, embed
 from equimorph.manifold.geometry.tangents import split_step
 from equimorph.manifold.geometry.topology import faces_of, pieces
+from equimorph.manifold.lookup.cell_index import CellIndex, Hits
 from equimorph.manifold.queries.nearest import SetPoints, local_minima, points_at_vertices
 from equimorph.model import Constraint, Descriptor, function_of
 from equimorph.structures import States, join_states
@@ -21,6 +23,8 @@ from equimorph.tasks.optimising.programme import Objective, Programme
 from equimorph.tasks.optimising.sqp import descend
 from equimorph.tasks.optimising.tangent_steps import unconstrained_setting
 from equimorph.tolerances import FEASIBLE
+
+Shares = Float[np.ndarray, "some corners"]
 
 CLOSE = 0.5
 """Distance of two predictions, in sizes of their cell, below which one of them will do."""
@@ -72,34 +76,29 @@ class Predictor:
         return faces_of(self.eset.cells, 2)
 
     @cached_property
-    def _ranges(self) -> tuple[Float[np.ndarray, "C k"], Float[np.ndarray, "C k"]]:
-        """Lower and upper ends of what may be found in or near each cell."""
-        corners = self.values[self.eset.cells]
-        low, high = corners.min(axis=1), corners.max(axis=1)
-        reach = corners.shape[2] * OVERHANG * (high - low)
-        return low - reach, high + reach
+    def _index(self) -> CellIndex:
+        """The cells in the space of values, in ranges over the set."""
+        corners = (self.values / self.spread)[self.eset.cells]
+        return CellIndex.of(corners, np.full(len(corners), OVERHANG))
 
-    def cells(
-        self, targets: Float[np.ndarray, " k"]
-    ) -> tuple[Float[np.ndarray, "some corners"], Int[np.ndarray, " some"]]:
-        """Barycentric coordinates at which cells take values, in or near them; which cells."""
-        low, high = self._ranges
-        near = np.ones(len(low), bool)
-        for k, value in enumerate(targets):
-            near &= (low[:, k] <= value) & (value <= high[:, k])
-        cells = np.flatnonzero(near)
-        corners = self.values[self.eset.cells[cells]]
-        sides = corners[:, 1:] - corners[:, :1]
-        size = np.maximum(np.abs(sides).max(axis=(1, 2), initial=0.0), 1e-300)
-        regular = np.abs(np.linalg.det(sides)) > 1e-12 * size ** sides.shape[1]
-        cells, corners, sides = cells[regular], corners[regular], sides[regular]
-        gap = targets - corners[:, 0]
-        inner = np.linalg.solve(np.swapaxes(sides, 1, 2), gap[:, :, None])[:, :, 0]
-        share = np.concatenate([1.0 - inner.sum(axis=1, keepdims=True), inner], axis=1)
-        inside = np.flatnonzero(share.min(axis=1) >= -OVERHANG)
-        order = inside[np.argsort(-share[inside].min(axis=1), kind="stable")]
-        chosen = order[self._different(share[order], cells[order])]
-        return share[chosen], cells[chosen]
+    @cached_property
+    def _tree(self) -> cKDTree:
+        """The vertices in the space of values."""
+        return cKDTree(self.values / self.spread)
+
+    def closest(self, targets: Float[np.ndarray, "many k"]) -> Int[np.ndarray, " many"]:
+        """Vertices with the least misfits."""
+        return np.asarray(self._tree.query(targets / self.spread)[1], int)
+
+    def cells(self, targets: Float[np.ndarray, "many k"]) -> tuple[Shares, Items, Items]:
+        """Barycentric coordinates at which cells take values, in or near them; cells, targets.
+
+        Those of each target one after the other, the most central first.
+        """
+        hits = self._index.near(targets / self.spread)
+        hits = hits.take(np.lexsort((-hits.weights.min(axis=1), hits.point)))
+        chosen = self._different(hits)
+        return hits.weights[chosen], hits.cell[chosen], hits.point[chosen]
 
     @cached_property
     def _sides(self) -> tuple[Float[np.ndarray, " C"], Int[np.ndarray, " C"]]:
@@ -108,7 +107,7 @@ class Predictor:
         Cells of one index on which the descriptors move with the parameters in the same sense.
         """
         eset = self.eset
-        places = embed(self.setting, eset.points.z, eset.points.p)
+        places = places_of(eset)
         first, rest = eset.cells[:, 0], eset.cells[:, 1:]
         size = np.max([np.linalg.norm(places[c] - places[first], axis=1) for c in rest.T], axis=0)
         moves = (
@@ -117,27 +116,29 @@ class Predictor:
         )
         return size, np.asarray(2 * eset.cell_index + (next(moves) * next(moves) > 0), int)
 
-    def _different(
-        self, share: Float[np.ndarray, "some corners"], cells: Int[np.ndarray, " some"]
-    ) -> Int[np.ndarray, " kept"]:
+    def _different(self, hits: Hits) -> Items:
         """Predictions that are not close to an earlier one from the same side of folds."""
         size, side = self._sides
-        corners, structure = self.eset.cells[cells], self.setting.structure
+        corners, structure = self.eset.cells[hits.cell], self.setting.structure
         n, free = structure.unknowns, self.setting.free
-        u = np.einsum("ck,cki->ci", share, self.eset.points.z[corners, :n])
-        p = np.einsum("ck,cki->ci", share, self.eset.points.p[corners][:, :, free])
+        u = np.einsum("ck,cki->ci", hits.weights, self.eset.points.z[corners, :n])
+        p = np.einsum("ck,cki->ci", hits.weights, self.eset.points.p[corners][:, :, free])
         place = np.concatenate([u * np.sqrt(structure.mass), p / self.setting.scales], axis=1)
-        gap = np.linalg.norm(place[:, None] - place[None], axis=2)
-        close = (gap < CLOSE * size[cells]) & (side[cells][:, None] == side[cells][None])
+        reach, side = CLOSE * size[hits.cell], side[hits.cell]
+        bounds = np.searchsorted(hits.point, np.arange(hits.point.max(initial=-1) + 2))
         kept: list[int] = []
-        for k in range(len(cells)):
-            if not close[k, kept].any():
-                kept.append(k)
+        for first, last in pairwise(bounds.tolist()):
+            own = place[first:last]
+            gap = np.linalg.norm(own[:, None] - own, axis=2)
+            close = (gap < reach[first:last]) & (side[first:last, None] == side[first:last])
+            chosen: list[int] = []
+            for k in range(last - first):
+                if not close[k, chosen].any():
+                    chosen.append(k)
+            kept += [first + k for k in chosen]
         return np.array(kept, int)
 
-    def guesses(
-        self, share: Float[np.ndarray, "some corners"], cells: Int[np.ndarray, " some"]
-    ) -> SetPoints:
+    def guesses(self, share: Shares, cells: Items) -> SetPoints:
         """Points of cells, with their planes, inside the box."""
         eset = self.eset
         corners = eset.cells[cells]
@@ -150,9 +151,7 @@ class Predictor:
     def planes(self, cells: Int[np.ndarray, " some"]) -> Float[np.ndarray, "some d coordinates"]:
         """Orthonormal bases of the planes of cells."""
         corners = self.eset.cells[cells]
-        used, place = np.unique(corners, return_inverse=True)
-        points = self.eset.points
-        at = embed(self.setting, points.z[used], points.p[used])[place.reshape(corners.shape)]
+        at = places_of(self.eset)[corners]
         sides = at[:, 1:] - at[:, :1]
         sides /= np.maximum(np.linalg.norm(sides, axis=2, keepdims=True), 1e-300)
         return np.ascontiguousarray(np.swapaxes(np.linalg.qr(np.swapaxes(sides, 1, 2))[0], 1, 2))
@@ -217,12 +216,12 @@ def twin_guesses(
     steps = np.einsum("lk,lkf->lf", right[:, -1], exact.frames[some])
     dz, dp = split_step(known.setting, steps)
     z, p, planes = exact.z[some], exact.p[some], rows[some]
-    values = []
-    for side in (-TWIN_STEP, 0.0, TWIN_STEP):
-        there = _onto_set(known.setting, SetPoints(z + side * dz, p + side * dp, planes))
-        own = [each.function(there.z, there.p) for each in known.descriptors]
-        values.append(np.stack(own, axis=1) / known.spread)
-    second = (values[0] - 2.0 * values[1] + values[2]) / TWIN_STEP**2
+    sides = [SetPoints(z + t * dz, p + t * dp, planes) for t in (-TWIN_STEP, TWIN_STEP)]
+    there = _onto_set(known.setting, SetPoints.concatenate(sides))
+    there_and_here = np.concatenate([there.z, z]), np.concatenate([there.p, p])
+    own = [each.function(*there_and_here) for each in known.descriptors]
+    behind, ahead, here = np.split(np.stack(own, axis=1) / known.spread, 3)
+    second = (behind - 2.0 * here + ahead) / TWIN_STEP**2
     bend = np.einsum("lm,lm->l", left[:, :, -1], second)
     with np.errstate(divide="ignore", invalid="ignore"):
         t = -2.0 * sizes[:, -1] / bend

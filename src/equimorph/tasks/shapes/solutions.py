@@ -14,7 +14,7 @@ from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet, Level
 from equimorph.manifold.queries.nearest import SetPoints, local_minima, points_at_vertices
 from equimorph.model import NOT_KEPT, Constraint, Descriptor, Schedule, worst_relative_excess
-from equimorph.structures import State, States
+from equimorph.structures import State, States, join_states
 from equimorph.tasks.distances import distinct
 from equimorph.tasks.optimising.programme import stability
 from equimorph.tasks.planning.planner import plan
@@ -233,11 +233,29 @@ def solve_shapes(
         groups = [_fit(known, each, constraints) for each in numbers]
     else:
         groups = _solve(known, numbers, constraints)
-    answers = []
-    for values, (states, misfit) in zip(numbers, groups, strict=True):
+    index, own = _sort_keys(eset, groups, "" if rank == "route" else rank)
+    closest, answers = known.closest(numbers), []
+    for k, (values, (states, misfit)) in enumerate(zip(numbers, groups, strict=True)):
         routes = [] if start is None else [plan(eset, start, s, within=within) for s in states]
-        answers.append(_answer(known, values, constraints, states, misfit, rank, routes))
+        key = np.nan_to_num([each.length for each in routes], nan=np.inf) if routes else own[k]
+        order = np.lexsort((key, index[k], np.where(misfit > EXACT, misfit, 0.0)))
+        ways = tuple(routes[i] for i in order) if routes else ()
+        found = states[order], index[k][order], misfit[order], ways
+        answers.append(_answer(known, values, constraints, found, int(closest[k])))
     return tuple(answers)
+
+
+def _sort_keys(
+    eset: EquilibriumSet, groups: list[tuple[States, Values]], rank: str
+) -> tuple[list[Int[np.ndarray, " lanes"]], list[Values]]:
+    """Index of each state of groups, and what is least for the best of each: energy or margin."""
+    states = join_states(eset.structure, [own for own, _ in groups])
+    key = np.zeros(len(states))
+    if len(states) and rank:
+        key = states.energy if rank == "energy" else -states.margin
+    index = states.index if len(states) else np.zeros(0, int)
+    ends = np.cumsum([len(own) for own, _ in groups])[:-1]
+    return np.split(index, ends), np.split(key, ends)
 
 
 def _numbers(
@@ -259,29 +277,18 @@ def _answer(
     known: Predictor,
     targets: Float[np.ndarray, " k"],
     within: tuple[Constraint, ...],
-    states: States,
-    misfit: Values,
-    rank: Rank,
-    routes: list[Route],
+    found: tuple[States, Int[np.ndarray, " lanes"], Values, tuple[Route, ...]],
+    closest: int,
 ) -> Shapes:
-    """Solutions of one question in order."""
-    index = states.index if len(states) else np.zeros(0, int)
-    own = np.zeros(len(states))
-    if len(states) and rank == "route":
-        own = np.nan_to_num([each.length for each in routes], nan=np.inf)
-    elif len(states):
-        own = states.energy if rank == "energy" else -states.margin
-    fits = misfit > EXACT
-    order = np.lexsort((own, index, np.where(fits, misfit, 0.0)))
-    closest, miss = _closest(known, targets)
+    """Solutions of one question, in order, with their indices, misfits and routes."""
+    misfit, gaps = found[2], (known.values[closest] - targets).tolist()
+    miss = dict(zip([each.name for each in known.descriptors], gaps, strict=True))
     status: Literal["solved", "fitted", "refused"] = "solved"
-    if len(order) == 0 or fits.all():
-        status = "fitted" if len(order) else "refused"
+    if (misfit > EXACT).all():
+        status = "fitted" if len(misfit) else "refused"
     why = "" if status == "solved" else _why(known.descriptors, targets, miss)
-    return Shapes(
-        status, why, states[order], index[order], misfit[order],
-        tuple(routes[k] for k in order) if routes else (), closest, miss, targets, within, known,
-    )  # fmt: skip
+    vertex = known.eset.points[closest]
+    return Shapes(status, why, *found, vertex, miss, targets, within, known)
 
 
 def _solve(
@@ -337,9 +344,7 @@ def _guesses(
         owner = np.repeat(np.arange(len(targets)), [len(each) for each in starts])
         used, place = np.unique(vertices, return_inverse=True)
         return points_at_vertices(known.eset, used).take(place), owner
-    parts = [known.cells(each) for each in targets]
-    owner = np.repeat(np.arange(len(targets)), [len(cells) for _, cells in parts])
-    shares, cells = (np.concatenate(column) for column in zip(*parts, strict=True))
+    shares, cells, owner = known.cells(targets)
     return known.guesses(shares, cells), owner
 
 
@@ -350,13 +355,6 @@ def _fit(
     states, misfit = best_fits(known, targets, within)
     kept = distinct(states, SAME_STATE)
     return states[kept], misfit[kept]
-
-
-def _closest(known: Predictor, targets: Float[np.ndarray, " k"]) -> tuple[State, dict[str, float]]:
-    best = int(known.misfits(targets).argmin())
-    gaps = (known.values[best] - targets).tolist()
-    names = [each.name for each in known.descriptors]
-    return known.eset.points[best], dict(zip(names, gaps, strict=True))
 
 
 def _why(

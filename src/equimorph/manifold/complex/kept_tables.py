@@ -1,0 +1,56 @@
+"""Tables of sets: what several tasks need of a set is computed once, and forgotten with the set.
+
+See docs/decisions.md, "Tables of a set are made once".
+"""
+
+from collections.abc import Callable
+from functools import wraps
+from typing import Any, TypeVar
+
+import numpy as np
+
+from equimorph.arrays import Float
+from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
+from equimorph.manifold.geometry.setting import embed
+from equimorph.manifold.geometry.topology import Adjacency, adjacency
+
+Table = TypeVar("Table")
+
+TABLES = "_kept_tables"
+"""Attribute of a set that holds its tables; neither pickles nor copies of a set have them."""
+
+
+def from_cache(eset: EquilibriumSet, key: Any, compute: Callable[[], Table]) -> Table:
+    """Return what was computed before for a set, or compute it."""
+    known: dict[Any, Table] = vars(eset).setdefault(TABLES, {})
+    if key not in known:
+        known[key] = compute()
+    return known[key]
+
+
+def kept(compute: Callable[[EquilibriumSet], Table]) -> Callable[[EquilibriumSet], Table]:
+    """A function of a set, computed once for each set; see `from_cache`.
+
+    An array is the same one each time, which nobody may change.
+    """
+
+    @wraps(compute)
+    def table(eset: EquilibriumSet) -> Table:
+        found = from_cache(eset, compute, lambda: compute(eset))
+        if isinstance(found, np.ndarray):
+            found.flags.writeable = False
+        return found
+
+    return table
+
+
+@kept
+def adjacency_of(eset: EquilibriumSet) -> Adjacency:
+    """Facets of the cells of a set, and how they hang together."""
+    return adjacency(eset.cells)
+
+
+@kept
+def places_of(eset: EquilibriumSet) -> Float[np.ndarray, "V coordinates"]:
+    """Vertices of a set in its metric; see `embed`."""
+    return embed(eset.setting, eset.points.z, eset.points.p)
