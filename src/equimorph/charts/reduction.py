@@ -16,7 +16,8 @@ from equimorph.charts.chart import Chart, Charted, PointStatus, check_cells
 from equimorph.charts.coordinates import Coordinates, coordinates_of
 from equimorph.charts.domain import Domain, typical_extent
 from equimorph.charts.location import Cells
-from equimorph.charts.preference import Preference, preferred_part
+from equimorph.charts.preference import Preference
+from equimorph.charts.preferred_part import preferred_part
 from equimorph.charts.preparation import cut_along_crossings, with_cusp_vertices
 from equimorph.charts.rules import Rule, Scores, rule_of
 from equimorph.errors import InputError

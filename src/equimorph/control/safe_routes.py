@@ -90,7 +90,7 @@ def _lift_anew(eset: EquilibriumSet, likely: LikelyLoads) -> EquilibriumSet:
             checks=0,
         )
 
-    return from_cache(eset, ("under", *loads.tolist()), lift)  # type: ignore[no-any-return]
+    return from_cache(eset, ("under", *loads.tolist()), lift)
 
 
 def _over(

@@ -1,6 +1,6 @@
 """`strongest`: actuator settings with the largest limit load, nominal and robust."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from itertools import product
 from typing import Literal
@@ -21,10 +21,14 @@ CANDIDATES = 4
 """Local maxima over the vertices from which interior optima are searched."""
 ROBUST = 2
 """Local maxima of the worst case over the vertices from which robust optima are searched."""
+ACROSS = 1e-3
+"""Radius, in its first one, at which searches for robust optima end before the exact one."""
+FIRST = 64
+"""Vertices with the largest values at which the worst case is determined first."""
 EXCHANGES = 5
 """Rounds in which offsets are added at which the limit load is smallest."""
 HOPELESS = 0.9
-"""Curves whose values stay below this share of what was found are left out."""
+"""Curves, and starts, whose values stay below this share of what was found are left out."""
 LEVEL = 1e-3
 """Slope along a curve at which its top is reached."""
 ONE_OPTIMUM = 1e-4
@@ -335,12 +339,35 @@ def _raise_minimum(
     def worst(settings: Settings) -> Values:
         return np.asarray(pieces(settings).min(axis=1))
 
-    value = worst(settings_of(lmap.grid)[0]).reshape(lmap.value.shape)
+    value = _worst_at_vertices(lmap, worst)
     radius, box = _steps(lmap), lmap.grid.box
-    ends = []
-    for vertex in _vertices(lmap, value)[:ROBUST]:
-        raised_to, _ = maximise_least(pieces, vertex, radius, box)
-        # across a jump the search goes on in all directions
-        top = climb(worst, raised_to, 0.1 * radius, box)
-        ends.append(maximise_least(pieces, top.setting, 0.1 * radius, box))
-    return max(ends, key=lambda end: end[1])
+    ends = [
+        maximise_least(pieces, vertex, radius, box, ACROSS)
+        for vertex in _vertices(lmap, value)[:ROBUST]
+    ]
+    hopeful = [place for place, least in ends if least >= HOPELESS * max(ends, key=_least)[1]]
+    # across a jump the search goes on in all directions; what follows is the exact one
+    tops = [climb(worst, place, 0.1 * radius, box, ACROSS) for place in hopeful]
+    exact = [maximise_least(pieces, top.setting, 0.1 * radius, box) for top in tops]
+    return max(exact, key=_least)
+
+
+def _worst_at_vertices(
+    lmap: LimitLoadMap, worst: Callable[[Settings], Values]
+) -> Float[np.ndarray, "rows columns"]:
+    """Worst values at the vertices of the grid; not numbers where these cannot be near the best.
+
+    No worst value is larger than that of the map itself.
+    """
+    settings, most = settings_of(lmap.grid)[0], np.nan_to_num(lmap.value.ravel())
+    out = np.full(len(settings), np.nan)
+    first = np.argsort(-most, kind="stable")[:FIRST]
+    out[first] = worst(settings[first])
+    rest = np.flatnonzero(np.isnan(out) & (most >= HOPELESS * out[first].max()))
+    if len(rest):
+        out[rest] = worst(settings[rest])
+    return out.reshape(lmap.value.shape)
+
+
+def _least(end: tuple[Float[np.ndarray, " 2"], float]) -> float:
+    return end[1]

@@ -19,6 +19,8 @@ SMALLEST_RADIUS = 1e-5
 """Radius of the search, in its first one, at which it ends."""
 ROUNDS = 40
 """Most circles."""
+MISFIT = 0.05
+"""Share of the range of values that a parabola misses at most where the ground is smooth."""
 
 Pieces = Callable[[Float[np.ndarray, "lanes 2"]], Float[np.ndarray, "lanes m"]]
 
@@ -44,15 +46,19 @@ class LocalMaximum:
     smooth: bool
 
 
-def climb(function: Function, start: Pair, radius: Pair, box: Box) -> LocalMaximum:
+def climb(
+    function: Function, start: Pair, radius: Pair, box: Box, smallest: float = SMALLEST_RADIUS
+) -> LocalMaximum:
     """Local maximum of a function in a box, from a start; not a number counts as lowest.
 
     Settings on a circle, turned in every round, are tried; the radius is halved where none is
     better. On smooth ground the top of a parabola through nine values finishes.
+
+    `smallest`: radius of the search, in its first one, at which it ends.
     """
     here, value, size = start, float(_values(function, start[None], box)[0]), 1.0
     for number in range(ROUNDS):
-        if size < SMALLEST_RADIUS:
+        if size < smallest:
             break
         angle = 2.0 * np.pi * (np.arange(DIRECTIONS) + 0.382 * number) / DIRECTIONS
         ring = np.stack([np.cos(angle), np.sin(angle)], axis=1)
@@ -63,6 +69,9 @@ def climb(function: Function, start: Pair, radius: Pair, box: Box) -> LocalMaxim
             here, value = np.clip(tried[best], box.lower, box.upper), float(values[best])
         else:
             size *= 0.5
+            # a parabola that misses the values around misses those at half the distance, too
+            if not _is_smooth(0.3 * ring, values[DIRECTIONS:], value):
+                continue
             done = _parabola(function, here, value, size * radius, box)
             if done is not None:
                 return done
@@ -72,6 +81,24 @@ def climb(function: Function, start: Pair, radius: Pair, box: Box) -> LocalMaxim
 def _values(function: Function, settings: Float[np.ndarray, "lanes 2"], box: Box) -> Values:
     inside = np.clip(settings, box.lower, box.upper)
     return np.nan_to_num(function(inside), nan=-np.inf)
+
+
+def _is_smooth(
+    places: Float[np.ndarray, "n 2"], values: Float[np.ndarray, " n"], middle: float
+) -> bool:
+    """Whether a parabola fits values around a place and in its middle."""
+    at, found = np.vstack([places, np.zeros(2)]), np.append(values, middle)
+    if not np.isfinite(found).all():
+        return False
+    terms = _terms(at / np.abs(at).max())
+    fit, *_ = np.linalg.lstsq(terms, found, rcond=None)
+    return bool(np.abs(terms @ fit - found).max() <= MISFIT * np.ptp(found))
+
+
+def _terms(at: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "n 6"]:
+    """Terms of a parabola at places."""
+    columns = np.ones(len(at)), at, at[:, 0] ** 2, at.prod(1), at[:, 1] ** 2
+    return np.column_stack(columns)
 
 
 def _parabola(
@@ -85,11 +112,11 @@ def _parabola(
         if not box.holds(at).all():
             return None
         found = function(at)
-        terms = np.column_stack([np.ones(9), NINE, NINE[:, 0] ** 2, NINE.prod(1), NINE[:, 1] ** 2])
+        terms = _terms(NINE)
         if not np.isfinite(found).all():
             return None
         fit, *_ = np.linalg.lstsq(terms, found, rcond=None)
-        if np.abs(terms @ fit - found).max() > 0.05 * np.ptp(found):
+        if np.abs(terms @ fit - found).max() > MISFIT * np.ptp(found):
             return None
         bend = np.array([[2 * fit[3], fit[4]], [fit[4], 2 * fit[5]]])
         if np.linalg.eigvalsh(bend).max() >= 0.0:
@@ -106,15 +133,19 @@ def _parabola(
     return LocalMaximum(place, top, slope, True) if top >= value - 1e-9 * abs(value) else None
 
 
-def maximise_least(pieces: Pieces, start: Pair, radius: Pair, box: Box) -> tuple[Pair, float]:
+def maximise_least(
+    pieces: Pieces, start: Pair, radius: Pair, box: Box, smallest: float = SMALLEST_REACH
+) -> tuple[Pair, float]:
     """Setting near a start whose smallest value is largest, and that value.
 
     Not a number counts as zero. Jumps are no obstacle for the steps, but no ridge to follow either.
+
+    `smallest`: reach, in radii, at which the search ends.
     """
     here, reach = start, 0.5
     around = _around(pieces, here[None], radius, box)[0]
     for _ in range(ITERATIONS):
-        if reach < SMALLEST_REACH:
+        if reach < smallest:
             break
         # the next points come with their neighbours: a call costs more than its lanes
         reaches = reach * SHORTER
