@@ -1,7 +1,7 @@
 """Equilibria of a mechanism along a motion of its parameters, and the fold at which they end."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import eigh, null_space
@@ -36,12 +36,13 @@ Course = Callable[[float], Settings]
 
 @dataclass(frozen=True, eq=False)
 class Balance:
-    """An equilibrium of a mechanism: entries, multipliers, settings."""
+    """An equilibrium of a mechanism: entries, multipliers, settings; its time on a course."""
 
     linkage: Mechanism
     v: Vector
     multipliers: Pulls
     y: Settings
+    time: float = 0.0
 
     @property
     def places(self) -> Float[np.ndarray, "members joints space"]:
@@ -137,52 +138,47 @@ class Quasistatics:
 
 def follow(start: Balance, course: Course, times: Float[np.ndarray, " times"]) -> Quasistatics:
     """Stable equilibria at all times, each from the ones before."""
-    found, here, at = [start], start, float(times[0])
-    before: tuple[Balance, float] | None = None
+    found, here = [start], replace(start, time=float(times[0]))
+    before: Balance | None = None
     for time in times[1:].tolist():
-        step = time - at
-        while at < time:
-            aim = min(time, at + step)
-            new = _next(here, before, at, aim, course)
+        step = time - here.time
+        while here.time < time:
+            new = _next(here, before, min(time, here.time + step), course)
             if new is None:
                 step *= 0.5
                 if step < NARROWEST * (times[-1] - times[0]):
-                    fold, last = fold_time(here, before, at, course, start.least)
+                    fold, last = fold_time(here, before, course, start.least)
                     return Quasistatics(tuple(found), fold, last)
                 continue
-            before, here, at = (here, at), new, aim
+            before, here = here, new
         found.append(here)
     return Quasistatics(tuple(found), None, here)
 
 
-def _next(
-    here: Balance, before: tuple[Balance, float] | None, at: float, aim: float, course: Course
-) -> Balance | None:
+def _next(here: Balance, before: Balance | None, time: float, course: Course) -> Balance | None:
     """The stable equilibrium at a time, if Newton's method stays near."""
     v, multipliers = here.v, here.multipliers
-    if before is not None and at > before[1]:
-        share = (aim - at) / (at - before[1])
-        v = v + share * (v - before[0].v)
-        multipliers = multipliers + share * (multipliers - before[0].multipliers)
-    new = balance(here.linkage, v, multipliers, course(aim), CONTRACTION)
+    if before is not None and here.time > before.time:
+        share = (time - here.time) / (here.time - before.time)
+        v = v + share * (v - before.v)
+        multipliers = multipliers + share * (multipliers - before.multipliers)
+    new = balance(here.linkage, v, multipliers, course(time), CONTRACTION)
     if new is None:
         return None
     moved = np.abs(new.v - here.v).max()
-    return new if moved < LARGEST_STEP and new.stable else None
+    return replace(new, time=time) if moved < LARGEST_STEP and new.stable else None
 
 
 def fold_time(
-    here: Balance, before: tuple[Balance, float] | None, at: float, course: Course, rest: float
+    here: Balance, before: Balance | None, course: Course, rest: float
 ) -> tuple[float, Balance]:
     """Time at which equilibria end, where ω² vanishes as the square root of the time left.
 
     nan where ω² does not fall to a small share of its value `rest` at the start, as when Newton's
     method fails elsewhere.
     """
-    known = [(at, here.least**2)]
-    if before is not None:
-        known.insert(0, (before[1], before[0].least ** 2))
-    end = at
+    known = [(each.time, each.least**2) for each in (before, here) if each is not None]
+    end = here.time
     for _ in range(FOLD_STEPS):
         if len(known) < 2:
             break

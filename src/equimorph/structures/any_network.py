@@ -2,7 +2,6 @@
 
 from abc import abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from functools import cached_property
 from itertools import product
 from typing import Any
 
@@ -96,13 +95,10 @@ class AnyNetwork(DiscreteStructure):
         """Mirror images and half turns that leave the network as it is."""
         return self._symmetries
 
-    @cached_property
-    def _symmetries(self) -> tuple[Symmetry, ...]:
-        return self._find_symmetries()
-
+    @property
     @abstractmethod
-    def _find_symmetries(self) -> tuple[Symmetry, ...]:
-        """Mirror images and half turns that leave the network as it is."""
+    def _symmetries(self) -> tuple[Symmetry, ...]:
+        """The same, found once."""
 
     # --- descriptors ----------------------------------------------------------------------------
 

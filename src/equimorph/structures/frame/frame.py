@@ -1,6 +1,7 @@
 """The frame: rods between rigid or hinged joints; its loads, actuators, descriptors, symmetries."""
 
 from collections.abc import Iterable, Mapping
+from functools import cached_property
 from typing import Annotated, ClassVar
 
 import numpy as np
@@ -222,5 +223,6 @@ class Frame(DescribedFrame):
         """The frame as drawn."""
         return np.zeros((len(p), self.size))
 
-    def _find_symmetries(self) -> tuple[Symmetry, ...]:
+    @cached_property
+    def _symmetries(self) -> tuple[Symmetry, ...]:
         return find_images(self, PlanarImage)

@@ -247,7 +247,7 @@ class GeneralMechanics(JointEquations, PlanarMechanics):
         self, z: Lanes, p: Parameters, follow: Float[np.ndarray, "lanes m unknowns"]
     ) -> Float[np.ndarray, "lanes places unknowns"]:
         columns = place_derivatives(self.model, self.nodal_angles(z, p), self.scalars(z, p))
-        return moved_places(columns, follow, self.unknown_nodes)
+        return moved_places(*columns, follow, self.unknown_nodes)
 
     def linearised(self, z: Lanes, p: Parameters, dp: Parameters) -> tuple[np.ndarray, ...]:
         """F, F_p·dp, and the parts of F_z: diagonal, border, trailing block."""

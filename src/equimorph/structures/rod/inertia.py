@@ -95,10 +95,9 @@ def following(
 
 
 def moved_places(
-    columns: tuple[Turns, Pulls], follow: Float[np.ndarray, "lanes m unknowns"], unknown: slice
+    angular: Turns, forced: Pulls, follow: Float[np.ndarray, "lanes m unknowns"], unknown: slice
 ) -> Places:
     """Derivatives of all places, one after the other, by the unknown angles."""
-    angular, forced = columns
     moved = angular[:, :, :, unknown]
     if follow.any():
         moved = moved + np.einsum("lnac,lcu->lnau", forced, follow)

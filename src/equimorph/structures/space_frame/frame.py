@@ -324,7 +324,8 @@ class SpatialFrame(DescribedSpatialFrame):
             return grow_stress(self.model, p)
         return super().natural(p)
 
-    def _find_symmetries(self) -> tuple[Symmetry, ...]:
+    @cached_property
+    def _symmetries(self) -> tuple[Symmetry, ...]:
         return find_images(self, SpatialImage)
 
     # --- pictures -------------------------------------------------------------------------------

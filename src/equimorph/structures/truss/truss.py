@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from functools import cached_property
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
@@ -233,7 +234,8 @@ class Truss(TrussMechanics, Shortening):
         """The state at rest."""
         return np.repeat(self._start[None], len(p), axis=0)
 
-    def _find_symmetries(self) -> tuple[Symmetry, ...]:
+    @cached_property
+    def _symmetries(self) -> tuple[Symmetry, ...]:
         return symmetries(self)
 
     # --- descriptors ----------------------------------------------------------------------------

@@ -42,10 +42,9 @@ class _Demand:
 
     @classmethod
     def of(
-        cls, eset: EquilibriumSet, ends: Ends, bounded: tuple[Extreme, float], others: Demands
+        cls, eset: EquilibriumSet, ends: Ends, extreme: Extreme, limit: float, others: Demands
     ) -> "_Demand":
         """The lowest peak of what is bounded, within the others."""
-        extreme, limit = bounded
         found = find_bottleneck(eset, ends, extreme, others.beyond(eset), others.margin)
         if found is not None:
             # routes over the pass stay within the limit, if there is room
@@ -126,13 +125,13 @@ def _demands(eset: EquilibriumSet, ends: Ends, demands: Demands) -> Iterator[_De
         rest = tuple(other for other in demands.constraints if replace(other, ease=0.0) != each)
         others = replace(demands, constraints=rest)
         if each.sense == "<=":
-            yield _Demand.of(eset, ends, (peak(each.descriptor, SLACK), each.bound), others)
+            yield _Demand.of(eset, ends, peak(each.descriptor, SLACK), each.bound, others)
         elif each.descriptor.branches is None:
-            yield _Demand.of(eset, ends, (least(each.descriptor, SLACK), each.bound), others)
+            yield _Demand.of(eset, ends, least(each.descriptor, SLACK), each.bound, others)
     if demands.margin > 0.0:
         margin = least(margin_of(eset.structure), SLACK)
         others = replace(demands, margin=0.0)
-        yield _Demand.of(eset, ends, (margin, demands.margin), others)
+        yield _Demand.of(eset, ends, margin, demands.margin, others)
 
 
 def _nearest(eset: EquilibriumSet, ends: Ends, demands: Demands) -> State | None:
