@@ -62,10 +62,8 @@ class Motion(Columns):
         faster = np.where(self._begun, 2.0 * self.velocity - self.velocity_before, self.velocity)
         mass = structure.inertia(ahead, p)
         gamma = structure.inertial_force(ahead, p, faster)
-        rest, rest_v = (
-            self._before(u, self.before),
-            self._before(self.velocity, self.velocity_before),
-        )
+        rest = self._before(u, self.before)
+        rest_v = self._before(self.velocity, self.velocity_before)
         heavy = mass * ((first / h) * (first / h + rate))[:, :, None]
         force = gamma + _times(mass, (first / h + rate) * rest / h + rest_v / h)
         todo, found = np.arange(len(z)), np.zeros(len(z), bool)

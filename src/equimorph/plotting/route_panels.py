@@ -24,11 +24,9 @@ from equimorph.tasks.route import Route
 _HEIGHT = 108 * style.MILLIMETRE
 _ZOOM = 1.06
 """Magnification of the solid view within its axes."""
-_SOLID, _PLANE, _SHAPES = (
-    (-0.04, 0.12, 0.6, 0.88),
-    (0.68, 0.575, 0.235, 0.38),
-    (0.68, 0.13, 0.3, 0.34),
-)
+_SOLID = (-0.04, 0.12, 0.6, 0.88)
+_PLANE = (0.68, 0.575, 0.235, 0.38)
+_SHAPES = (0.68, 0.13, 0.3, 0.34)
 """Axes of the three panels as shares of the figure: left, bottom, width, height."""
 
 

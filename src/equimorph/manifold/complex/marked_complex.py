@@ -261,9 +261,7 @@ def _bisect(
 def edges_of(cells: Cells, base: int) -> tuple[Int[np.ndarray, "E 2"], Int[np.ndarray, "C sides"]]:
     """All edges, sorted, and the numbers of those of each cell (pairs 01, 02, 12 and so on)."""
     pairs = np.array(list(combinations(range(cells.shape[1]), 2)))
-    ends, of_cells = (
-        np.empty((cells.shape[0] * len(pairs), 2), int),
-        np.empty((len(cells), len(pairs)), int),
-    )
+    ends = np.empty((cells.shape[0] * len(pairs), 2), int)
+    of_cells = np.empty((len(cells), len(pairs)), int)
     count = number_edges(np.ascontiguousarray(cells), pairs, base, ends, of_cells)
     return ends[:count].copy(), of_cells

@@ -255,10 +255,8 @@ def pin(
     towards = np.array([group[member] for group in groups], int)
     z += share * (points.z[towards] - z)
     p += share * (points.p[towards] - p)
-    fold, cap = (
-        kind in {VertexKind.FOLD, VertexKind.CORNER},
-        kind in {VertexKind.CAP, VertexKind.CORNER},
-    )
+    fold = kind in {VertexKind.FOLD, VertexKind.CORNER}
+    cap = kind in {VertexKind.CAP, VertexKind.CORNER}
     rows = principal_directions(deviations, span.shape[1] - fold - cap)
     around = np.linalg.norm(deviations, axis=2).max(axis=1, initial=0.0)
     aim = Aim(setting, fold, cap, span, embed(setting, z, p), rows)

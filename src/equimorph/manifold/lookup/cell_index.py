@@ -198,10 +198,8 @@ class Rims:
         if len(hits) == 0:  # the rule
             return hits.point, hits.cell
         close = hits.weights[:, 0] <= self.bands.overhang[hits.cell, 0]
-        point, cell = (
-            np.repeat(hits.point[close], self.beside.shape[1]),
-            self.beside[hits.cell[close]].ravel(),
-        )
+        point = np.repeat(hits.point[close], self.beside.shape[1])
+        cell = self.beside[hits.cell[close]].ravel()
         return point[cell >= 0], cell[cell >= 0]
 
 

@@ -134,10 +134,8 @@ class Chains:
         """Chains without their first points after a share of each step; None: not on the set."""
         frames, step = np.concatenate([m.frames for m in moves]), [m.step for m in moves]
         edge, end = np.concatenate([m.edge for m in moves]), [m.end for m in moves]
-        inner, goal = (
-            SetPoints.concatenate([m.inner for m in moves]),
-            SetPoints.concatenate([m.last for m in moves]),
-        )
+        inner = SetPoints.concatenate([m.inner for m in moves])
+        goal = SetPoints.concatenate([m.last for m in moves])
         middle, good = self.on_set.move(inner, frames, share * np.concatenate(step))
         there = np.ones(len(moves), bool)
         if edge.shape[1]:

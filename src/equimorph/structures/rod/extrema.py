@@ -187,11 +187,9 @@ def largest_norms(
     first = np.einsum("ij,njk->nik", slope, own)
     second = np.einsum("ij,njk->nik", slope, first)
     grid = np.cos(angles)
-    place, low, top = (
-        grid[at],
-        grid[np.maximum(at - 1, 0)],
-        grid[np.minimum(at + 1, len(grid) - 1)],
-    )
+    place = grid[at]
+    low = grid[np.maximum(at - 1, 0)]
+    top = grid[np.minimum(at + 1, len(grid) - 1)]
     for _ in range(POLISHING):
         basis = legendre.legvander(place, mesh.degree)
         value, rate, bend = (np.einsum("ni,nik->nk", basis, each) for each in (own, first, second))

@@ -79,10 +79,8 @@ class SpatialDescription(RodDescription):
 
     def build(self, elements: int, degree: int) -> Build:
         """The rod in non-dimensional form."""
-        plane, ratios = (
-            self.profile("stiffness"),
-            (self.profile("torsion"), self.profile("lateral")),
-        )
+        plane = self.profile("stiffness")
+        ratios = (self.profile("torsion"), self.profile("lateral"))
         twisted, aside, bent = (
             self.profile(name, "curvature")
             for name in ("natural_twist", "side_curvature", "curvature")

@@ -346,10 +346,8 @@ class DesignSearch:
         return new.violation <= FEASIBLE and new.level < base.level - SHARE * gain
 
     def _accept(self, new: Judged) -> None:
-        values, value = (
-            self.problem.family.values(new.x),
-            self.problem.objectives[0].sign * new.level,
-        )
+        values = self.problem.family.values(new.x)
+        value = self.problem.objectives[0].sign * new.level
         self.history.append(DesignStep(values, value, new.violation, self.rebuilds))
 
     def active(self, last: Judged) -> tuple[str, ...]:

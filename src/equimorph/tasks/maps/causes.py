@@ -285,9 +285,7 @@ def is_sharp(
     places. Kinds may differ, too.
     """
     structure = paths.sheet.structure
-    now, before = (
-        sample_distance(structure, left, right),
-        sample_distance(structure, pairs.a, pairs.b),
-    )
+    now = sample_distance(structure, left, right)
+    before = sample_distance(structure, pairs.a, pairs.b)
     usual = (2.0 * share) ** SHRINKING * before
     return np.asarray(np.isinf(now) | (np.isfinite(before) & (now > usual)))

@@ -140,10 +140,8 @@ def curvature_map(  # noqa: PLR0913  # the knobs of the public face, most by key
     ----------
     [Feher2025]_, section 3.2.2.
     """
-    sheet, place = (
-        natural_states_over(structure, grid, load, fixed),
-        position(structure.parameters, load),
-    )
+    sheet = natural_states_over(structure, grid, load, fixed)
+    place = position(structure.parameters, load)
     lowest = sheet.base[place]
     if not lowest < at < bound:
         raise InputError(

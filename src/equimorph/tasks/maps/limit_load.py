@@ -145,10 +145,8 @@ def limit_load_map(  # noqa: PLR0913  # the knobs of the public face, most by ke
     ----------
     [Feher2025]_, section 3.2.1.
     """
-    sheet, place = (
-        natural_states_over(structure, grid, load, fixed),
-        position(structure.parameters, load),
-    )
+    sheet = natural_states_over(structure, grid, load, fixed)
+    place = position(structure.parameters, load)
     lowest = sheet.base[place]
     if not bound > lowest:
         raise InputError(f"`bound` must exceed {load} = {lowest:g}; got {bound!r}.")

@@ -107,10 +107,8 @@ def _relaxations(
     """Of the demands in addition to those of the set, those that give way alone."""
     for each in demands:
         if each.found is not None:
-            best, bounds = (
-                each.found.bottleneck,
-                (*each.others.constraints, ease(each.found.bound)),
-            )
+            best = each.found.bottleneck
+            bounds = (*each.others.constraints, ease(each.found.bound))
             relaxed = replace(each.others, constraints=bounds)
             route = route_with_reserve(eset, ends, (relaxed, relaxed), (), each.found)
             attained = np.nan
