@@ -36,7 +36,9 @@ def through_corners(
     Other values that are not known, nan, are left out.
     """
     d = at.shape[2]
-    known, first, rise = np.isfinite(values), corners[:, 0], corners[:, 1:] - corners[:, :1]
+    known = np.isfinite(values) & np.isfinite(at).all(axis=2)
+    at, values = np.where(known[..., None], at, 0.0), np.where(known, values, 0.0)
+    first, rise = corners[:, 0], corners[:, 1:] - corners[:, :1]
     left = values - first[:, None] - np.einsum("nmd,nd->nm", at, rise)
     # products less what makes them vanish at the corners
     bows = monomials(at)[..., 1 + d :].copy()

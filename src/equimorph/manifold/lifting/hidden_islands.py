@@ -34,7 +34,9 @@ NARROWER = 1.0 / 3.0
 """Size of each simplex, relative to the one before; the first is as large as the cell."""
 ZOOMS = 5
 """Simplices in each other: the last ones are 81 times smaller than the cell."""
-ITERATIONS = 8
+FLAT = 1e-12
+"""Part of their squared size that is added to simplices, which may be flat to round-off."""
+ITERATIONS = 20
 """Of Newton's method, at most."""
 NOWHERE = -1
 """Instead of a vertex: there is no cell beyond this side."""
@@ -65,16 +67,17 @@ def hidden_islands(eset: EquilibriumSet) -> States:
         return empty
     patches, size, found = _of_cells(eset), 1.0, [empty]
     least, centres, _ = _models(setting, patches)
+    guesses = centres
     for _ in range(ZOOMS):
         deep = np.flatnonzero(least < patches.deep)
         if len(deep) == 0:
             break
-        patches = _inside(setting, patches.take(deep), centres[deep], size)
+        patches = _inside(setting, patches.take(deep), centres[deep], guesses[deep], size)
         other = np.asarray((patches.determinants < 0.0).any(axis=1))
-        found.append(_lowest(setting, patches.take(other)))
+        found.append(_deepest(setting, patches.take(other)))
         whole = np.isfinite(patches.determinants[:, : d + 1]).all(axis=1)
         patches, size = patches.take(whole & ~other), NARROWER
-        least, centres = _lowest_known(setting, patches)
+        least, centres, guesses = _lowest(setting, patches)
     states = join_states(setting.structure, found)
     cells = [eset.mesh.locate(place) for place in states.p[:, setting.free]]
     return states[np.unique(cells, return_index=True)[1]]
@@ -85,6 +88,7 @@ def _of_cells(eset: EquilibriumSet) -> _Patches:
     vertices, singular = eset.points, are_singular(eset.kinds)
     known = np.zeros(len(singular))
     known[~singular] = determinants(eset.structure, vertices.z[~singular], vertices.p[~singular])
+    known[~np.isfinite(known)] = np.nan
     plain = np.flatnonzero(~singular[eset.cells].any(axis=1))
     around = np.concatenate([eset.cells, _across(eset.cells)], axis=1)[plain]
     values = np.where(around == NOWHERE, np.nan, known[around])
@@ -121,34 +125,40 @@ def _models(
     away = y - y[:, :1]
     sides, others = away[:, 1 : d + 1], away[:, d + 1 :]
     gram = sides @ np.swapaxes(sides, 1, 2)
+    gram += FLAT * np.trace(gram, axis1=1, axis2=2)[:, None, None] * np.eye(d)
     at = np.swapaxes(np.linalg.solve(gram, sides @ np.swapaxes(others, 1, 2)), 1, 2)
     corners, values = np.split(patches.determinants, [d + 1], axis=1)
     return *least_in_simplex(through_corners(corners, at, values), d), at
 
 
-def _lowest_known(setting: Setting, patches: _Patches) -> tuple[ItemValues, Shares]:
-    """Least values of the models, or of other points, which may lie lower; and where."""
-    least, shares, at = _models(setting, patches)
-    values = patches.determinants[:, shares.shape[1] :]
-    lowest = np.where(np.isnan(values), np.inf, values).argmin(axis=1)
-    value, place = (each[np.arange(len(least)), lowest] for each in (values, at))
-    lower = value < least
-    whole = np.concatenate([1.0 - place.sum(axis=1, keepdims=True), place], axis=1)
-    return np.where(lower, value, least), np.where(lower[:, None], whole, shares)
+def _lowest(setting: Setting, patches: _Patches) -> tuple[ItemValues, Shares, Shares]:
+    """Least of the values and of those of the models, where the one is, and the other."""
+    least, guesses, at = _models(setting, patches)
+    at = np.concatenate([1.0 - at.sum(axis=2, keepdims=True), at], axis=2)
+    corners = np.tile(np.eye(at.shape[2]), (len(at), 1, 1))
+    values = np.where(np.isnan(patches.determinants), np.inf, patches.determinants)
+    lowest, every = values.argmin(axis=1), np.arange(len(at))
+    centres = np.concatenate([corners, at], axis=1)[every, lowest]
+    return np.minimum(least, values[every, lowest]), centres, guesses
 
 
-def _inside(setting: Setting, patches: _Patches, shares: Shares, size: float) -> _Patches:
-    """Smaller simplices on the set, with the middles of their sides, around places in others."""
+def _inside(
+    setting: Setting, patches: _Patches, centres: Shares, guesses: Shares, size: float
+) -> _Patches:
+    """Smaller simplices on the set around places in others.
+
+    With the middles of their sides, their centres, and guesses where the determinant is least.
+    """
     structure, d = setting.structure, len(setting.free)
-    pattern = _pattern(d)
-    weights = shares[:, None] + size * (pattern - 1.0 / (d + 1.0))
+    weights = centres[:, None] + size * (_pattern(d) - 1.0 / (d + 1.0))
+    weights = np.concatenate([weights, centres[:, None], guesses[:, None]], axis=1)
     n, points = weights.shape[:2]
     z, p = (np.concatenate(weights @ each[:, : d + 1]) for each in (patches.z, patches.p))
     directions = free_directions(structure, setting.free, len(z))
     guards = Guards(iterations=ITERATIONS)
     found = settle(structure, z, p, directions, guards=guards, frames=False)
     values = np.repeat(patches.sign, points) * determinants(structure, found.z, found.p)
-    values[~found.found] = np.nan
+    values[~found.found | ~np.isfinite(values)] = np.nan
     return _Patches(
         patches.sign,
         patches.deep,
@@ -165,7 +175,7 @@ def _pattern(d: int) -> Float[np.ndarray, "points corners"]:
     return np.concatenate([corners, middles])
 
 
-def _lowest(setting: Setting, patches: _Patches) -> States:
+def _deepest(setting: Setting, patches: _Patches) -> States:
     """States of simplices at which the determinant is least."""
     least, every = np.nanargmin(patches.determinants, axis=1), np.arange(len(patches.sign))
     return States(setting.structure, patches.z[every, least], patches.p[every, least])

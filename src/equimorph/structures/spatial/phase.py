@@ -156,7 +156,8 @@ class PinnedMechanics(SpatialMechanics):
         step.dz[:, -1] -= z[:, -1]
         step.residual[:] = np.abs(residual).max(axis=1)
         scale = np.divide(rate, 2.0 * springs[:, 1], out=np.ones(len(z)), where=rate != 0.0)
-        step.determinant[:] *= -(scale**2)
+        with np.errstate(over="ignore"):  # of rods with many elements
+            step.determinant[:] *= -(scale**2)
         return self.pivot_steps(step, ratio, z, p, dp, row, corner, defect)
 
     def velocity(self, z: Lanes) -> Lanes:
