@@ -9,7 +9,7 @@ from equimorph import plotting
 from equimorph.errors import InputError
 from equimorph.model import Descriptor
 from equimorph.plotting import style
-from equimorph.plotting.raster_kernels import shade_pixel
+from equimorph.plotting.raster_kernels import GLOSS, shade_pixel
 from equimorph.plotting.scene import Scene
 from equimorph.plotting.shading import corner_normals
 
@@ -82,6 +82,15 @@ def test_a_surface_is_lit_alike_from_both_sides():
     np.testing.assert_array_equal(*lit)
     assert lit.min() >= 0.0
     assert lit.max() <= 1.0
+
+
+def test_what_faces_halfway_between_light_and_viewer_shines():
+    """A black surface shows its highlight alone, straight on; across it none is left."""
+    light, halfway, lit = np.array([-0.6, 0.0, 0.8]), np.array([0.0, 0.0, 1.0]), np.empty((2, 3))
+    for normal, shaded in zip((halfway, np.array([1.0, 0.0, 0.0])), lit, strict=True):
+        shade_pixel(np.zeros(3), normal, light, halfway, shaded)
+    np.testing.assert_allclose(lit[0], GLOSS, rtol=1e-12)
+    np.testing.assert_array_equal(lit[1], 0.0)
 
 
 def test_the_surface_keeps_clear_of_its_legend(spring_set):
