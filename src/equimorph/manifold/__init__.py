@@ -1,6 +1,6 @@
 """The equilibrium set as a simplicial complex: lifting, folds, strata, audit."""
 
-from equimorph.manifold.build import INTERVALS as INTERVALS, equilibrium_set as equilibrium_set
+from equimorph.manifold.build import equilibrium_set as equilibrium_set
 from equimorph.manifold.complex.audit import Audit as Audit
 from equimorph.manifold.complex.description import overturned_cells as overturned_cells
 from equimorph.manifold.complex.equilibrium_set import (
@@ -48,4 +48,5 @@ from equimorph.manifold.queries.stability_distance import (
     StabilityDistance as StabilityDistance,
     stability_distance as stability_distance,
 )
+from equimorph.manifold.question import INTERVALS as INTERVALS
 from equimorph.manifold.refining.refine import refine as refine

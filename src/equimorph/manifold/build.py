@@ -1,18 +1,13 @@
 """`equilibrium_set`: lift a grid, close the loops, and check what came out."""
 
-import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
-from itertools import product
 
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
-from equimorph.argument_kinds import short
 from equimorph.arrays import Items, Place
-from equimorph.equilibria.legs import check_isolated
-from equimorph.errors import InputError
 from equimorph.manifold.complex.description import Frame, wrong_cells
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.manifold.complex.kept_sets import Effort, question_of_set, recall_set
@@ -31,11 +26,13 @@ from equimorph.manifold.lifting.grid import (
 )
 from equimorph.manifold.lifting.pairing import Pairing, start_pairing
 from equimorph.manifold.lifting.seeds import Seeds, is_symmetric, seeds
+from equimorph.manifold.lifting.tile_rounds import TileRounds
+from equimorph.manifold.lifting.tiles import cuts_between
 from equimorph.manifold.lifting.unseen import UnseenFinder
+from equimorph.manifold.question import intervals_of, limit_of, setting_of, tiles_of
 from equimorph.manifold.refining.refine import refine_cells
-from equimorph.model import Box, Constraint, Journal, Progress, Silent, parameter_vector, position
+from equimorph.model import Box, Constraint, Journal, Progress, Silent, Workers
 from equimorph.structures import Structure
-from equimorph.tolerances import SAME_TO_ROUNDING
 
 COARSE = {1: 12, 2: 12, 3: 7}
 """Most intervals along each parameter of the coarse grid over which seeds are spread."""
@@ -56,15 +53,8 @@ RECOVERED = 200
 """Missing states, spread over all that were found, whose surroundings are lifted at once."""
 MENDED = 8
 """Rounds of bisection around cells of a wrong sense: two tripods needed one and two."""
-LIMIT = 60_000, 30
-"""Default limit of the number of equilibria: this constant, or this many per grid point."""
-MOST_POINTS = 1_000_000
-"""Points of a grid above which a set is refused, if no limit allows more: they take 6 GB."""
 HOPELESS = 50
 """Stop bisecting once more than 50 cells, and 4× the initial number, are undecided."""
-
-INTERVALS = {1: (200,), 2: (47, 81), 3: (24, 24, 24)}
-"""Of the grid, by the number of free parameters, if not given."""
 
 
 @check_arguments
@@ -79,8 +69,10 @@ def equilibrium_set(  # noqa: PLR0913  # the knobs of the public face, most by k
     checks: int = 2,
     accuracy: float | None = None,
     limit: int | None = None,
+    tiles: tuple[int, ...] | None = None,
     progress: Progress | None = None,
     journal: Journal | None = None,
+    workers: Workers | None = None,
 ) -> EquilibriumSet:
     """All equilibria over a box in one to three parameters that are connected to the seeds.
 
@@ -117,11 +109,17 @@ def equilibrium_set(  # noqa: PLR0913  # the knobs of the public face, most by k
         Largest number of equilibria over the grid. Beyond it lifting stops, the set holds what is
         known by then, and its audit reports it (`stopped`). Default: 60 000, or 30 per grid point
         if that is more.
+    tiles
+        Numbers of parts along each parameter into which the grid is cut: edges are lifted and cells
+        closed in each part by itself, and glued. The set is the same, up to the order of its
+        vertices and cells and to round-off; it does not depend on who lifts the tiles.
     progress
         Sink for progress reports; an exception that it raises cancels the computation.
     journal
         Stores the set, like `storage.open_journal`: a second call with the same journal reads it
-        from there, bit for bit.
+        from there, bit for bit. While the set is computed, tiles that are finished are stored.
+    workers
+        Who lifts and closes the tiles; see `Workers`. Without tiles they have nothing to do.
 
     Returns
     -------
@@ -132,36 +130,50 @@ def equilibrium_set(  # noqa: PLR0913  # the knobs of the public face, most by k
     InputError
         If the box has more than three parameters, the grid has more points than `limit` (one
         million by default), a name is unknown, a parameter is both free and fixed, a value has no
-        meaning, the accuracy is not positive, `within` holds anything but constraints, or the
-        journal is that of another computation.
+        meaning, the accuracy is not positive, `within` holds anything but constraints, there are
+        more tiles along a parameter than intervals, or the journal is that of another computation.
     """
     progress = progress or Silent()
-    intervals = _intervals(box, intervals)
-    effort = Effort(seed, checks, accuracy, _limit(intervals, limit))
-    setting = _setting(structure, box, fixed or {}, tuple(within))
+    intervals = intervals_of(box, intervals)
+    counts = tiles_of(intervals, tiles)
+    effort = Effort(seed, checks, accuracy, limit_of(intervals, limit), counts)
+    setting = setting_of(structure, box, fixed or {}, tuple(within))
     known = dict(fixed or {})
-    compute = partial(_on_grids, setting, box, known, intervals, effort, progress)
+    order = _Order(setting, box, known, effort, progress, journal, workers)
+    compute = partial(_on_grids, order, intervals)
     if journal is None:
         return compute()
     question = question_of_set(setting, box, intervals, effort)
     return recall_set(journal, question, setting, box, known, compute)
 
 
-def _on_grids(
-    setting: Setting,
-    box: Box,
-    fixed: Mapping[str, float],
-    intervals: tuple[int, ...],
-    effort: Effort,
-    progress: Progress,
-) -> EquilibriumSet:
+@dataclass(frozen=True)
+class _Order:
+    """A set that is asked for, over any grid, and who takes part in it."""
+
+    setting: Setting
+    box: Box
+    fixed: Mapping[str, float]
+    effort: Effort
+    progress: Progress
+    journal: Journal | None
+    workers: Workers | None
+
+    def rounds(self, lines: Lines) -> TileRounds | None:
+        """Tiles of a grid, if it is cut into such."""
+        if self.effort.tiles is None:
+            return None
+        return TileRounds(cuts_between(lines, self.effort.tiles), self.workers, self.journal)
+
+
+def _on_grids(order: _Order, intervals: tuple[int, ...]) -> EquilibriumSet:
     """Lift a set over a grid, or over a finer one if that is too coarse."""
     for number in range(GRIDS):
-        eset = _of_grid(setting, box, fixed, intervals, effort, progress)
+        eset = _of_grid(order, intervals)
         if eset.audit.stopped:
             break
-        if effort.accuracy is not None:
-            eset = refine_cells(eset, effort.accuracy, progress)
+        if order.effort.accuracy is not None:
+            eset = refine_cells(eset, order.effort.accuracy, order.progress)
         # over one parameter no cells are bisected to find what they hide
         hidden = eset.audit.missing if len(intervals) == 1 else 0
         if eset.audit.unrefined + hidden == 0 or number == GRIDS - 1:
@@ -171,25 +183,18 @@ def _on_grids(
     return eset
 
 
-def _of_grid(
-    setting: Setting,
-    box: Box,
-    fixed: Mapping[str, float],
-    intervals: tuple[int, ...],
-    effort: Effort,
-    progress: Progress,
-) -> EquilibriumSet:
+def _of_grid(order: _Order, intervals: tuple[int, ...]) -> EquilibriumSet:
     """Lift a set over one grid, and what the completeness checks find that it lacks."""
-    lines = grid_lines(box, intervals)
-    progress.report("seeds", 0, 1)
+    lines, setting, effort = grid_lines(order.box, intervals), order.setting, order.effort
+    order.progress.report("seeds", 0, 1)
     pairing = start_pairing(setting, grid_mesh(lines), effort.limit)
-    pairing.points.over_vertices(*_spread(pairing, lines, effort.seed, progress))
+    pairing.points.over_vertices(*_spread(pairing, lines, effort.seed, order.progress))
     generator = np.random.default_rng([effort.seed, 1])
-    lifting = _Lifting(pairing, box, fixed, intervals, progress)
+    lifting = _Lifting(pairing, order, intervals, order.rounds(lines))
     recovered = 0
     for number in range(SEARCHES):
         cells, eset = lifting.upright()
-        found = check(eset, generator, _checks(effort.checks, setting), progress)
+        found = check(eset, generator, _checks(effort.checks, setting), order.progress)
         lacking = len(found.missing)
         # what stays undecided in spite of bisection is not mended by more equilibria
         ended = pairing.is_full or cells.doubtful > HOPELESS
@@ -205,11 +210,14 @@ class _Lifting:
     """A grid that is being lifted, with what has been seen of its cells."""
 
     def __init__(
-        self, pairing: Pairing, box: Box, fixed: Mapping[str, float], intervals: tuple[int, ...],
-        progress: Progress,
-    ) -> None:  # fmt: skip
-        self.pairing, self.box, self.intervals, self.progress = pairing, box, intervals, progress
-        self.fixed, self.finder, self.unseen = fixed, CellFinder(), UnseenFinder()
+        self,
+        pairing: Pairing,
+        order: _Order,
+        intervals: tuple[int, ...],
+        tiles: TileRounds | None,
+    ) -> None:
+        self.pairing, self.order, self.intervals, self.tiles = pairing, order, intervals, tiles
+        self.finder, self.unseen = CellFinder(), UnseenFinder()
 
     def upright(self) -> tuple[Cells, EquilibriumSet]:
         """Cells and set; grid cells below those of a wrong sense are bisected and lifted again."""
@@ -222,16 +230,49 @@ class _Lifting:
         return cells, eset
 
     def _lift(self) -> tuple[Cells, EquilibriumSet]:
-        cells, bisected = _lift_grid(self.pairing, self.finder, self.unseen, self.progress)
-        mesh, setting = self.pairing.mesh, self.pairing.setting
-        frame = Frame(setting, mesh, self.box, self.fixed, self.intervals)
+        cells, bisected = self._lift_grid()
+        order = self.order
+        frame = Frame(order.setting, self.pairing.mesh, order.box, order.fixed, self.intervals)
         return cells, account(self.pairing, cells, frame, bisected)
+
+    def _lift_grid(self) -> tuple[Cells, int]:
+        """Flood, close, assemble; bisect what is not certain and go on.
+
+        Tiles take part in the first round; the others touch few cells.
+        """
+        pairing, unseen = self.pairing, self.unseen
+        bisected = first = 0
+        rounds = BISECTIONS[pairing.mesh.dimension]
+        for number in range(rounds):
+            cells = self._lift_cells(self.tiles if number == 0 else None)
+            doubtful = cells.doubtful
+            first = doubtful if number == 0 else first
+            # along a line where the set is singular doubt only multiplies; elsewhere it vanishes
+            hopeless = doubtful > max(HOPELESS, 4 * first)
+            last = hopeless or pairing.is_full or number == rounds - 1
+            if doubtful == 0 or last:
+                cells = _look(pairing, cells, self.finder, unseen)
+            if cells.doubtful == 0 or last:
+                break
+            bisected += cells.doubtful
+            chosen, exits = _longest_edges(pairing, cells), unseen.exits | ring_middles(pairing)
+            # first those through which tongues and strips leave their cells
+            chosen = np.concatenate([np.array(list(exits), int), np.setdiff1d(chosen, list(exits))])
+            pairing.use_mesh(bisect(pairing.mesh, chosen, exits))
+        return cells, bisected
+
+    def _lift_cells(self, tiles: TileRounds | None) -> Cells:
+        """Flood and close all cells, in tiles if there are such."""
+        pairing, progress = self.pairing, self.order.progress
+        flood_crossings(pairing, progress, tiles.flood if tiles else flood)
+        progress.report("closing loops", 0, 1)
+        return self.finder.find(pairing, partial(tiles.close, progress=progress) if tiles else None)
 
     def with_checks(
         self, cells: Cells, eset: EquilibriumSet, found: Check, recovered: int
     ) -> EquilibriumSet:
         """The set with what the checks found in its audit."""
-        box, full = self.box, self.pairing.is_full
+        box, full = self.order.box, self.pairing.is_full
         audit = replace(
             eset.audit,
             checked=found.found,
@@ -271,86 +312,6 @@ def _named(box: Box, values: Place) -> tuple[tuple[str, float], ...]:
 def _checks(checks: int, setting: Setting) -> int:
     """Points at which is checked: more where that is cheap, and where pieces hang together less."""
     return checks * (CHEAP if len(setting.free) == 1 or is_symmetric(setting) else 1)
-
-
-def _intervals(box: Box, intervals: tuple[int, ...] | None) -> tuple[int, ...]:
-    d = len(box.names)
-    if d not in INTERVALS:
-        raise InputError(
-            f"`box` must have one, two or three parameters; got {d} ({', '.join(box.names)})."
-        )
-    if intervals is None:
-        return INTERVALS[d]
-    if len(intervals) != d:
-        number = ("one whole number", "two whole numbers", "three whole numbers")[d - 1]
-        raise InputError(f"`intervals` must be {number} >= 2; got {intervals!r}.")
-    return tuple(intervals)
-
-
-def _limit(intervals: tuple[int, ...], limit: int | None) -> int:
-    """Most equilibria of a set over a grid that is not too large."""
-    points = math.prod(count + 1 for count in intervals)
-    most = MOST_POINTS if limit is None else limit
-    if points > most:
-        raise InputError(
-            f"`intervals` must give at most {most} points of the grid, or `limit` allow more; got "
-            f"{short(intervals)}, which give {points:.3g}."
-        )
-    least, each = LIMIT
-    return max(least, each * points) if limit is None else limit
-
-
-def _setting(
-    structure: Structure, box: Box, fixed: Mapping[str, float], within: tuple[Constraint, ...]
-) -> Setting:
-    both = set(box.names) & set(fixed)
-    if both:
-        raise InputError(f"`fixed` must not name a parameter of the box; got {', '.join(both)}.")
-    free = np.array([position(structure.parameters, name) for name in box.names])
-    for corner in (box.lower, box.upper):
-        values = dict(zip(box.names, corner.tolist(), strict=True))
-        base = parameter_vector(structure.parameters, {**fixed, **values})
-    sides = zip(box.lower.tolist(), box.upper.tolist(), strict=True)
-    corners = np.repeat(base[None], 2 ** len(free), axis=0)
-    corners[:, free] = list(product(*sides))
-    if structure.have_orbits(corners).all():
-        check_isolated(structure, corners)
-    for name, width in zip(box.names, box.upper - box.lower, strict=True):
-        period = structure.parameters[position(structure.parameters, name)].period
-        if width > period * (1.0 + SAME_TO_ROUNDING):
-            raise InputError(
-                f"`box.{name}` must be no wider than {period:g}, after which the structure is the "
-                f"same again; got {width:g}."
-            )
-    validity = tuple(each for each in structure.validity if each not in within)
-    return Setting(structure, base, free, (*within, *validity))
-
-
-def _lift_grid(
-    pairing: Pairing, finder: CellFinder, unseen: UnseenFinder, progress: Progress
-) -> tuple[Cells, int]:
-    """Flood, close, assemble; bisect what is not certain and go on."""
-    bisected = first = 0
-    rounds = BISECTIONS[pairing.mesh.dimension]
-    for number in range(rounds):
-        flood_crossings(pairing, progress)
-        progress.report("closing loops", 0, 1)
-        cells = finder.find(pairing)
-        doubtful = cells.doubtful
-        first = doubtful if number == 0 else first
-        # along a line where the set is singular doubt only multiplies; elsewhere it vanishes
-        hopeless = doubtful > max(HOPELESS, 4 * first)
-        last = hopeless or pairing.is_full or number == rounds - 1
-        if doubtful == 0 or last:
-            cells = _look(pairing, cells, finder, unseen)
-        if cells.doubtful == 0 or last:
-            break
-        bisected += cells.doubtful
-        chosen, exits = _longest_edges(pairing, cells), unseen.exits | ring_middles(pairing)
-        # first those through which tongues and strips leave their cells
-        chosen = np.concatenate([np.array(list(exits), int), np.setdiff1d(chosen, list(exits))])
-        pairing.use_mesh(bisect(pairing.mesh, chosen, exits))
-    return cells, bisected
 
 
 def _look(pairing: Pairing, cells: Cells, finder: CellFinder, unseen: UnseenFinder) -> Cells:

@@ -30,6 +30,7 @@ from equimorph.model.journal import (
     content_of_descriptor as content_of_descriptor,
     content_of_function as content_of_function,
     cut_rows as cut_rows,
+    map_chunks as map_chunks,
     map_rows as map_rows,
     recall_or_compute as recall_or_compute,
 )

@@ -10,7 +10,7 @@ See docs/decisions.md, "Workers are shaped like map".
 import functools
 import hashlib
 import sys
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from types import (
     BuiltinFunctionType,
@@ -69,6 +69,24 @@ def cut_rows(count: int, workers: Workers | None) -> list[slice]:
     return [slice(first, first + size) for first in range(0, count, size)]
 
 
+Chunk = TypeVar("Chunk")
+Result = TypeVar("Result")
+
+
+def map_chunks(
+    function: Callable[[Chunk], Result], chunks: Iterable[Chunk], workers: Workers | None
+) -> Generator[Result]:
+    """Results of a function on chunks in their order, of workers if there are any.
+
+    When the iterator is closed, what is not yet computed is dropped.
+    """
+    results = map(function, chunks) if workers is None else workers.map(function, chunks)
+    try:
+        yield from results
+    finally:
+        getattr(results, "close", lambda: None)()
+
+
 def map_rows(
     function: Callable[[Rows], Found],
     rows: Rows,
@@ -92,14 +110,10 @@ def map_rows(
         Called with the number of finished chunks; what it raises cancels the others.
     """
     chunks = (rows.take(cut) for cut in cuts)
-    results = map(function, chunks) if workers is None else workers.map(function, chunks)
     found: list[Found] = []
-    try:
-        for done, each in enumerate(results, 1):
-            found.append(each)
-            finished(done)
-    finally:
-        getattr(results, "close", lambda: None)()
+    for done, each in enumerate(map_chunks(function, chunks, workers), 1):
+        found.append(each)
+        finished(done)
     joined: Found = type(found[0]).concatenate(found)
     return joined
 

@@ -101,7 +101,7 @@ class JournalFile:
         self._replaying = True
 
     def recall(self, step: str) -> Findings | None:
-        """Findings of the next entry if it is that of a step; else that and all after it go."""
+        """Findings of the next entry if it is that of a step; what is kept then takes its place."""
         if not self._replaying:
             return None
         file = self._open
@@ -110,7 +110,7 @@ class JournalFile:
             entry = _entry(file)
             if entry is not None and entry[0] == step:
                 return entry[1]
-            self._cut(start)
+            file.seek(start)
         self._replaying = False
         return None
 
@@ -121,6 +121,7 @@ class JournalFile:
             np.lib.format.write_array(content, np.asarray(array), allow_pickle=False)
         body = content.getvalue()
         with self._writable():
+            self._open.truncate()
             self._open.write(f"{len(body):0{LENGTH}x}{checksum(body)}".encode() + body)
             self._open.flush()
 

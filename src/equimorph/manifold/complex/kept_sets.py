@@ -44,6 +44,7 @@ class Effort:
     checks: int
     accuracy: float | None
     limit: int
+    tiles: tuple[int, ...] | None = None
 
 
 def question_of_set(setting: Setting, box: Box, intervals: tuple[int, ...], effort: Effort) -> str:
@@ -112,13 +113,20 @@ def recall_set(
 ) -> EquilibriumSet:
     """Return the set that a journal keeps for a question; without one, compute and keep it.
 
+    What is kept of tiles while it is computed gives way to the set.
+
     Raises
     ------
     InputError
         If the journal is that of another question.
     """
     journal.begin(question)
-    entry = recall_or_compute(journal, "set", lambda: _entry(compute()))
+    entry = journal.recall("set")
+    if entry is None:
+        journal.begin(question)
+        found = _entry(compute())
+        journal.begin(question)
+        entry = recall_or_compute(journal, "set", lambda: found)
     return _set(entry, setting, box, fixed)
 
 

@@ -120,6 +120,21 @@ class Points:
         self.count += 1
         return at
 
+    def add_many(
+        self,
+        z: Float[np.ndarray, "some size"],
+        p: Float[np.ndarray, "some parameters"],
+        index: Some,
+        kinds: Some,
+    ) -> Some:
+        """Add extra points inside cells; return their numbers."""
+        self._reserve(len(z))
+        at = np.arange(self.count, self.count + len(z))
+        self.z[at], self.p[at], self.index[at], self.kind[at] = z, p, index, kinds
+        self.vertex[at] = self.edge[at] = self.following[at] = -1
+        self.count += len(z)
+        return at
+
     def grow_vertices(self, vertices: int) -> None:
         """Make room for new grid vertices."""
         self.head = np.concatenate([self.head, np.full(vertices - len(self.head), -1)])

@@ -109,6 +109,12 @@ class Balls:
     crossing_owner: Int[np.ndarray, " x"]
     doubtful: Int[np.ndarray, " k"]
 
+    @classmethod
+    def none(cls) -> "Balls":
+        """No balls, as over fewer parameters."""
+        corners, facets, none = np.zeros((0, 4), int), np.zeros((0, 3), int), np.zeros(0, int)
+        return cls(corners, none, none, facets, none, facets, none, facets, none, none)
+
 
 def fill(pairing: Pairing, discs: Discs, wanted: Bool[np.ndarray, " N"]) -> Balls:
     """Fill all spheres over the flagged grid tetrahedra."""
@@ -119,7 +125,7 @@ def fill(pairing: Pairing, discs: Discs, wanted: Bool[np.ndarray, " N"]) -> Ball
     doubtful[spheres.others.owner[lost]] = True
     crossing = pairing.points.kind == VertexKind.CROSSING
     closed = closed_surfaces(spheres.others, caps, ~doubtful[spheres.others.owner], crossing)
-    parts = part(closed)
+    parts = part(closed, _marks(pairing.points))
     doubtful[closed.owner[~parts.whole]] = True
     middles = _middles(pairing, parts, doubtful)
     apexes = _apexes(pairing, parts, middles, doubtful)
@@ -143,6 +149,11 @@ def fill(pairing: Pairing, discs: Discs, wanted: Bool[np.ndarray, " N"]) -> Ball
     )
 
 
+def _marks(points: Points) -> Float[np.ndarray, " points"]:
+    """A number for each point that hardly any other one has."""
+    return np.asarray(points.z @ np.cos(np.arange(points.z.shape[1])))
+
+
 def _large(mesh: BaseMesh) -> Bool[np.ndarray, " N"]:
     """Grid tetrahedra that have not been divided often."""
     size = np.abs(volumes(mesh.vertices[mesh.tetrahedra]))
@@ -159,7 +170,7 @@ def _caps(
     count = len(surfaces.owner)
     amount = np.bincount(surfaces.surface, minlength=count)
     around = np.bincount(surfaces.rim_surface, minlength=count)
-    at, points = _group(surfaces.rim_surface, surfaces.rims, count)
+    at, points = _group(surfaces.rim_surface, surfaces.rims, _marks(pairing.points))
     ends = {
         kind: pairing.points.kind[points] == kind
         for kind in (VertexKind.CORNER, VertexKind.CROSSING)
@@ -179,12 +190,15 @@ def _caps(
 
 
 def _group(
-    group: Items, points: Int[np.ndarray, "n k"], groups: int
+    group: Items, points: Int[np.ndarray, "n k"], marks: Float[np.ndarray, " points"]
 ) -> tuple[Int[np.ndarray, " m"], Int[np.ndarray, " m"]]:
-    """Distinct points of each group, in order: their groups and their numbers."""
+    """Distinct points of each group, in the order of their marks: their groups and their numbers.
+
+    So what is computed from them does not depend on the order in which they were found.
+    """
     base = int(points.max(initial=0)) + 1
     at, own = np.divmod(distinct((group[:, None] * base + points).ravel()), base)
-    return at, own
+    return at, own[np.lexsort([marks[own], at])]
 
 
 def _groups(
@@ -201,7 +215,7 @@ def _middles(
 ) -> Int[np.ndarray, " curves"]:
     """Exact point inside every curve: a fold, or a crossing; it can be on the constraint."""
     count = len(parts.curve_surface)
-    at, points = _group(parts.curve, parts.folds, count)
+    at, points = _group(parts.curve, parts.folds, _marks(pairing.points))
     cap = parts.closed.cap[parts.curve_surface]
     middles = np.full(count, -1)
     own = points == cap[at]
@@ -235,7 +249,7 @@ def _apexes(
     apexes[four] = parts.closed.corners[by_region[first[four]], 0]
     whole = parts.whole[parts.region_surface]
     wanted = np.flatnonzero(~folded & (apexes < 0) & whole)
-    at, points = _group(parts.region, parts.closed.corners, count)
+    at, points = _group(parts.region, parts.closed.corners, _marks(pairing.points))
     owner = parts.closed.owner[parts.region_surface[wanted]]
     found = np.array(_pin(pairing, _groups(at, points, wanted), VertexKind.AMID, owner), int)
     apexes[wanted] = found

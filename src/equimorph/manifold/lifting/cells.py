@@ -1,5 +1,6 @@
 """From discs and balls to the cells of a set, and from these to the set itself."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
@@ -157,21 +158,31 @@ class Cells:
         return len(self.doubtful_triangles) + len(self.doubtful_tetrahedra)
 
 
+Close = Callable[[Pairing], tuple[Discs, Balls]]
+
+
 class CellFinder:
     """Finds the cells of the set over a mesh that is being bisected."""
 
     def __init__(self) -> None:
         self._known: Volumes | None = None
 
-    def find(self, pairing: Pairing) -> Cells:
-        """Cells of the set over a mesh whose edges are all lifted."""
+    def find(self, pairing: Pairing, close: Close | None = None) -> Cells:
+        """Cells of the set over a mesh whose edges are all lifted.
+
+        `close` finds all discs and balls; without it, those are kept that have not changed.
+        """
         if pairing.mesh.dimension == 1:
             return _segments(pairing)
         if pairing.mesh.dimension == 2:
-            discs = assemble(pairing, find_loops(pairing))
+            discs = close(pairing)[0] if close else assemble(pairing, find_loops(pairing))
             marked = (discs.folds, discs.caps, discs.crossings)
             return Cells(discs.corners, discs.index, *marked, discs.doubtful)
-        self._known = volumes_over(pairing, self._known)
+        if close and self._known is None:
+            mesh, found = pairing.mesh, close(pairing)
+            self._known = Volumes(Seen.of(pairing), mesh.tetrahedra, mesh.faces, *found)
+        else:
+            self._known = volumes_over(pairing, self._known)
         discs, balls = self._known.discs, self._known.balls
         marked = (balls.folds, balls.caps, balls.crossings)
         return Cells(balls.corners, balls.index, *marked, discs.doubtful, balls.doubtful)

@@ -4,6 +4,8 @@ Where only one is known, the other is started by branch switching. If the other 
 lifted in a step that did not notice the crossing, it is traced again in finer steps.
 """
 
+from collections.abc import Callable
+
 import numpy as np
 
 from equimorph.arrays import Float, Int, Items
@@ -35,9 +37,14 @@ HALVES = 2
 """Of each curve through a crossing."""
 
 
-def flood_crossings(pairing: Pairing, progress: Progress) -> None:
-    """Flood, and go on until both curves through each crossing are known, if they can be."""
-    flood(pairing, progress)
+def flood_crossings(
+    pairing: Pairing, progress: Progress, lift: Callable[[Pairing, Progress], None] = flood
+) -> None:
+    """Flood, and go on until both curves through each crossing are known, if they can be.
+
+    `lift` lifts edges from all known points, like `flood`.
+    """
+    lift(pairing, progress)
     for number in range(EFFORTS - 1):
         alone = lonely(pairing)
         if len(alone) == 0:
@@ -46,7 +53,7 @@ def flood_crossings(pairing: Pairing, progress: Progress) -> None:
             _switch(pairing, alone)
         else:
             _trace_again(pairing, alone)
-        flood(pairing, progress)
+        lift(pairing, progress)
 
 
 def lonely(pairing: Pairing) -> Items:

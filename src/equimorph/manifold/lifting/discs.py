@@ -352,7 +352,7 @@ def _fill(pairing: Pairing, plans: list[Plan], found: _Found) -> None:
                 found.undecided.add(plan.polygon.triangle)
             else:
                 by_size.setdefault(len(piece), []).append(_PlanPiece(plan, piece, index))
-    for pieces in by_size.values():
+    for _, pieces in sorted(by_size.items()):  # so every triangle has its discs in one order
         _triangulate(pairing, pieces, found)
 
 

@@ -3,13 +3,13 @@
 And the regions of closed ones between folds, with the points from which they are coned.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from equimorph.arrays import Bool, Float, Int, ItemFlags, Items, Pairs, Triples
+from equimorph.arrays import Bool, Float, Int, ItemFlags, Items, ItemValues, Pairs, Triples
 from equimorph.manifold.complex.base_mesh import BaseMesh
 from equimorph.manifold.geometry.simplices import volumes
 from equimorph.manifold.geometry.topology import adjacency, distinct, keys_of, labels, orientation
@@ -264,8 +264,12 @@ def _sides_on_crossings(
     return np.asarray(at & np.roll(at, -1, axis=1))
 
 
-def part(closed: Closed) -> Parts:
-    """Part closed surfaces along the sides at which the index jumps."""
+def part(closed: Closed, marks: Float[np.ndarray, " points"]) -> Parts:
+    """Part closed surfaces along the sides at which the index jumps.
+
+    Curves are in the order of the mean `marks` of their points: which one is the first one around a
+    region does not depend on the order in which points were found.
+    """
     corners, index, surface = closed.corners, closed.index, closed.surface
     count = len(closed.owner)
     base = int(corners.max(initial=0)) + 1
@@ -282,6 +286,7 @@ def part(closed: Closed) -> Parts:
     folds, beside = sides[first[folded]], region[pairs[folded]]
     fold_surface = surface[pairs[folded, 0]]
     curves = rings(folds, fold_surface, count)
+    curves = replace(curves, label=_in_order(curves.label, marks[folds].mean(axis=1)))
     curve_surface = np.zeros(int(curves.amount.sum()), int)
     curve_surface[curves.label] = fold_surface
     first_curve = np.full(len(region_index), len(curve_surface))
@@ -299,6 +304,14 @@ def part(closed: Closed) -> Parts:
         closed, region, region_surface, region_index, first_curve,
         folds, curves.label, beside, curve_surface, curve_met, whole,
     )  # fmt: skip
+
+
+def _in_order(label: Items, marks: ItemValues) -> Items:
+    """Labels in the order of their mean marks."""
+    mean = np.bincount(label, marks) / np.maximum(np.bincount(label), 1)
+    rank = np.empty(len(mean), int)
+    rank[np.argsort(mean)] = np.arange(len(mean))
+    return np.asarray(rank[label])
 
 
 def _of_regions(
