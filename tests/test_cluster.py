@@ -17,6 +17,7 @@ import equimorph as em
 from equimorph import cluster
 from equimorph.errors import MissingError
 from equimorph.optional_packages import load_package
+from equimorph.study import run_study
 from same_records import assert_equal
 
 distributed = pytest.importorskip("distributed")
@@ -34,6 +35,15 @@ kind = "limit_load_map"
 box = { x_l = [LEAST, 0.95], k = [1.0, 2.0] }
 intervals = [40, 30]
 load = "F"
+"""
+TILED = """
+[structure]
+kind = "spring"
+
+[set]
+box = { x_l = [0.5, 1.3], F = [-0.2, 0.2] }
+intervals = [12, 12]
+tiles = [2, 2]
 """
 BATCHES = list(np.arange(40.0).reshape(8, 5))
 
@@ -131,6 +141,28 @@ def test_a_chunk_that_ends_all_its_workers_is_named_and_the_others_are_kept(clie
 
 
 @pytest.mark.slow
+def test_a_set_in_tiles_is_the_same_when_a_worker_is_killed_at_any_time(client):
+    """One of two workers at each of five random times: the bits of one process."""
+    arch = em.Rod(load="uniform")
+    box = em.Box(Theta=(0.2, 2.5), Delta=(-2.0, 2.0))
+    given = {"fixed": {"q": 2.5}, "within": [arch.max_curvature <= 20], "checks": 0}
+    given |= {"intervals": (46, 41), "tiles": (4, 2)}
+    alone = em.equilibrium_set(arch, box, **given)
+    workers, rng = cluster.dask(client), np.random.default_rng(1)
+    assert_equal(em.equilibrium_set(arch, box, workers=workers, **given), alone)
+    began = time.perf_counter()
+    em.equilibrium_set(arch, box, workers=workers, **given)
+    took = time.perf_counter() - began
+    for share in rng.uniform(0.05, 0.8, 5):
+        process = rng.choice(list(client.run(os.getpid).values()))
+        killer = threading.Timer(share * took, os.kill, (int(process), signal.SIGKILL))
+        killer.start()
+        assert_equal(em.equilibrium_set(arch, box, workers=workers, **given), alone)
+        killer.join()
+        client.wait_for_workers(2, timeout=60)
+
+
+@pytest.mark.slow
 def test_a_worker_with_other_versions_is_refused_and_errors_come_through(client):
     workers = cluster.dask(client)
     with pytest.raises(ValueError, match="text"):
@@ -164,7 +196,7 @@ def test_a_missing_package_is_named_with_the_command_that_installs_it(monkeypatc
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("number", range(2))
+@pytest.mark.parametrize("number", range(3))
 def test_examples_of_the_page_run(tmp_path, number):
     """Those with processes of this machine, each as a script of its own."""
     code = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)[number]
@@ -189,3 +221,16 @@ def test_studies_run_on_a_cluster_as_without(tmp_path):
         one, other = (tmp_path / each / name / "load-map.csv" for each in ("without", "with"))
         assert one.read_bytes() == other.read_bytes()
         assert len(one.read_text(encoding="utf-8").splitlines()) > 40 * 30
+
+
+@pytest.mark.slow
+def test_sets_of_studies_are_lifted_in_tiles_by_a_cluster(tmp_path):
+    """The set has the bits of one that is lifted here."""
+    (tmp_path / "tiled.toml").write_text(TILED, encoding="utf-8")
+    spring = em.Spring()
+    box = em.Box(x_l=(0.5, 1.3), F=(-0.2, 0.2))
+    here = em.equilibrium_set(spring, box, intervals=(12, 12), tiles=(2, 2))
+    with cluster.connect("local:2") as workers:
+        outcome = run_study(tmp_path / "tiled.toml", tmp_path / "out", workers=workers)
+    assert_equal(outcome.equilibrium_set.points, here.points)
+    np.testing.assert_array_equal(outcome.equilibrium_set.cells, here.cells)

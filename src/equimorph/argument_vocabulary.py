@@ -76,6 +76,7 @@ RANGES: Mapping[str, Range] = {
         ("radius", "damping"), Range(0.0, LARGEST, "a finite number >= 0", "finite numbers >= 0")
     ),
     "intervals": count(2, np.inf),
+    "tiles": count(1, np.inf),
     "confidence": Range(0.5, 1.0 - 1e-12, "between 0.5 and 1", "between 0.5 and 1", above=True),
     "slide": Range(
         -2.0 * np.pi, 2.0 * np.pi, "a direction in radians, within ±2π", "directions in radians"

@@ -21,6 +21,7 @@ SET = (
 seed = 3
 checks = 1
 accuracy = 0.05
+tiles = [3, 2]
 
 """
 )
@@ -63,7 +64,7 @@ def test_every_option_of_a_set_can_be_asked_for(run):
     audit = run[0].equilibrium_set.audit
     assert audit.accuracy == 0.05
     assert audit.deviation <= 0.05
-    options = {"seed": 3, "checks": 1, "accuracy": 0.05, "limit": None}
+    options = {"seed": 3, "checks": 1, "accuracy": 0.05, "limit": None, "tiles": [3, 2]}
     assert run[0].problem.extents["set"].options == options
 
 

@@ -33,7 +33,7 @@ def run_and_show(
     replace
         Replace the results of another study there.
     workers
-        Who computes the rays of maps and the trials.
+        Who lifts the tiles of the set, and computes the rays of maps and the trials.
 
     Returns
     -------

@@ -142,7 +142,7 @@ def run_study(
     progress
         Receives the progress of the run.
     workers
-        Who computes the rays of maps and the trials; see `Workers`.
+        Who lifts the tiles of the set, and computes the rays of maps and the trials; see `Workers`.
 
     Returns
     -------
@@ -233,7 +233,7 @@ def solve(
     progress
         Receives the progress of the run.
     workers
-        Who computes the rays of maps and the trials.
+        Who lifts the tiles of the set, and computes the rays of maps and the trials.
     """
     seconds: dict[str, float] = {}
     checkpoints = Checkpoints(folder, problem.structure)
@@ -243,7 +243,8 @@ def solve(
     ground = problem.ground
     if ground.extent is not None:
         with _measure_time(seconds, "equilibrium set"):
-            eset = _equilibrium_set(study, ground, ground.extent, checkpoints, progress)
+            compute = partial(_lift_set, ground, ground.extent, progress, workers)
+            eset = checkpoints.answer(_question(study, of_set=True), compute)
         reused = bool(checkpoints.found)
         problem = problem.on(eset)
         checkpoints = replace(checkpoints, descriptors=problem.ground.descriptors)
@@ -268,22 +269,20 @@ def _question(study: Study, *, of_set: bool) -> dict[str, Any]:
     return base | {"set": asked["set"]} if of_set else base
 
 
-def _equilibrium_set(
-    study: Study, ground: Ground, extent: Extent, checkpoints: Checkpoints, progress: Progress
+def _lift_set(
+    ground: Ground, extent: Extent, progress: Progress, workers: Workers | None
 ) -> EquilibriumSet:
-    def compute() -> EquilibriumSet:
-        with at_key("set"):
-            return equilibrium_set(
-                ground.structure,
-                extent.box,
-                fixed=extent.fixed,
-                within=extent.constraints,
-                intervals=extent.intervals,
-                **extent.options,
-                progress=progress,
-            )
-
-    return checkpoints.answer(_question(study, of_set=True), compute)
+    with at_key("set"):
+        return equilibrium_set(
+            ground.structure,
+            extent.box,
+            fixed=extent.fixed,
+            within=extent.constraints,
+            intervals=extent.intervals,
+            **extent.options,
+            progress=progress,
+            workers=workers,
+        )
 
 
 def _equilibria(

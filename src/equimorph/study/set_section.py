@@ -36,8 +36,10 @@ class _Extent(Section):
 
     @model_validator(mode="after")
     def _one_each(self) -> "_Extent":
-        if self.intervals is not None and len(self.intervals) != len(self.box):
-            raise requirement("give one number of intervals for each parameter of its box")
+        for key in ("intervals", "tiles"):
+            numbers = getattr(self, key)
+            if numbers is not None and len(numbers) != len(self.box):
+                raise requirement(f"give one number of {key} for each parameter of its box")
         return self
 
 

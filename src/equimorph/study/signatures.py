@@ -63,6 +63,7 @@ MEANINGS: Mapping[str, Any] = {
     "seed": Seed,
     "checks": Annotated[int, Field(ge=0, le=1000)],
     "count": Annotated[int, Field(ge=2, le=20)],
+    "tiles": list[Annotated[int, Field(ge=1, le=1000)]],
     "limit": Annotated[int, Field(ge=1, le=100_000_000)],
     "samples": Annotated[int, Field(ge=2, le=1000)],
     "trials": Annotated[int, Field(ge=1, le=100_000)],
