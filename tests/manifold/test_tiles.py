@@ -36,14 +36,22 @@ SETS = {
         ARCH, {"Theta": (0.6, 1.4), "Delta": (-0.6, 0.6), "q": (0, 3)}, (5, 6, 4), {},
     ),
     "spring": (SPRING, {"x_l": (0.4, 1.4), "F": (-0.3, 0.3)}, (12, 12), {}),
+    "spring with crossings": (
+        SPRING, {"x_l": (0.5, 1.3), "k": (1, 2)}, (8, 6), {"fixed": {"F": 0.0}},
+    ),
     "spring over three": (
         SPRING, {"x_l": (0.4, 1.4), "F": (-0.3, 0.3), "k": (1, 2)}, (6, 6, 4), {},
     ),
     "truss": (TRUSS, {"F": (-0.2, 0.2), "a": (-0.2, 0.2)}, (12, 9), {}),
 }  # fmt: skip
 TILES = {1: [(2,), (4,), (8,)], 2: [(2, 1), (2, 2), (4, 2)], 3: [(2, 1, 1), (1, 2, 2), (2, 2, 2)]}
+LONG = ("arch with crossings", "arch over three")
 CASES = [
-    pytest.param(name, tiles, marks=() if tiles == TILES[len(tiles)][-1] else pytest.mark.slow)
+    pytest.param(
+        name,
+        tiles,
+        marks=() if tiles == TILES[len(tiles)][-1] and name not in LONG else pytest.mark.slow,
+    )
     for name, each in SETS.items()
     for tiles in TILES[len(each[1])]
 ]
