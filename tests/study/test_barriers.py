@@ -64,6 +64,26 @@ def test_barriers_over_the_set_are_those_of_settings(run):
     assert state.stable
 
 
+def test_barriers_over_one_parameter_have_no_figure(tmp_path):
+    """There is no plane to draw them in; at x_l = 0.8 and F = 0 the barrier is 0.02."""
+    line = """
+title = "Over the force alone"
+[structure]
+kind = "spring"
+[set]
+box = { F = [-0.1, 0.1] }
+fixed = { x_l = 0.8 }
+within = ["angle <= 1.2", "angle >= -1.2"]
+[[barriers]]
+name = "all"
+"""
+    outcome, out = answered(tmp_path, line)
+    _, _, most = outcome.of("barriers")["all"]
+    assert most.energy > 0.02
+    assert (out / "all-barriers.csv").exists()
+    assert not list(out.glob("all-barriers*.png"))
+
+
 def test_barriers_are_a_name_in_other_questions(run):
     """Along the guarded route the barrier stays above its bound.
 
