@@ -39,12 +39,16 @@ class Events(Columns):
     @classmethod
     def join(cls, parts: list["Events"], size: int) -> "Events":
         """All events of some parts, sorted by lane and then by arclength."""
-        none = np.zeros(0, int)
-        nothing = cls(
-            none, none, np.zeros((0, size)), np.zeros(0), np.zeros(0),
-            np.zeros((0, 2), int), np.zeros(0, bool),
-        )  # fmt: skip
-        whole = cls.concatenate([nothing, *parts])
+        some = [part for part in parts if len(part.lanes)]
+        if not some:
+            none = np.zeros(0, int)
+            return cls(
+                none, none, np.zeros((0, size)), np.zeros(0), np.zeros(0),
+                np.zeros((0, 2), int), np.zeros(0, bool),
+            )  # fmt: skip
+        whole = some[0] if len(some) == 1 else cls.concatenate(some)
+        if len(whole.lanes) == 1:
+            return whole
         return whole.take(np.lexsort((whole.travelled, whole.lanes)))
 
     def near_side(self, events: Some) -> Some:
@@ -71,9 +75,11 @@ def locate_all(
     ]
     if not options.locate_passed:
         bits = [bit for bit in bits if bit & options.stops]
-    parts = []
+    parts, there = [], 0
+    for each in brackets:
+        there |= int(np.bitwise_or.reduce(each.what))
     for bit in bits:
-        bracket = _join(brackets, bit)
+        bracket = _join(brackets, bit) if there & bit else None
         if bracket is None:
             continue
         parts.append(events_at(bracket, bit, _locate(curve, bracket, bit, constraints)))

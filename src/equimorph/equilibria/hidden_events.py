@@ -130,6 +130,8 @@ def hidden_events(curve: Curve, points: Points, options: TraceOptions) -> Events
     skips = np.diff(kept) > 1
     same = (np.diff(kept) == 1 + skips) & (np.diff(lanes[kept]) == 0)
     at = np.flatnonzero((close | skips) & same & (np.diff(index[kept]) == 0))
+    if len(at) == 0:
+        return Events.join([], curve.structure.size)
     pairs = few.take(at), few.take(at + 1)
     first = np.where(skips[at], probe.length[kept[at] + 1], np.nan)
     return look_inside(curve, lanes[kept[at]], pairs, first, options)

@@ -143,6 +143,8 @@ def look_inside(
 
     `first` is a length at which one is known to be small, or NaN.
     """
+    if len(lane) == 0:
+        return Events.join([], curve.metric.size)
     sign, zero = np.sign(ends[0].value), _zero(curve.take(lane), ends)
     low, high = (_upright(end, sign, zero) for end in ends)
     front, begun = ends[0].front, ends[0].length

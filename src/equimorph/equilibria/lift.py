@@ -356,15 +356,13 @@ def lift(
     >>> em.lift(rest, {"F": 0.5}).end.kind
     'arrived'
     """
-    options = replace(
-        options or TraceOptions(record=isinstance(state, State)),
-        through_folds=through_folds,
-        through_branch_points=through_folds,
-    )
+    one = isinstance(state, State)
+    # what hides in the steps of one state is searched for afterwards, more thoroughly
+    kept = {"record": True, "look_inside": False} if one else {}
+    through = {"through_folds": through_folds, "through_branch_points": through_folds}
+    options = replace(options or TraceOptions(record=False), **through, **kept)
     if isinstance(state, States):
         check_starts(state)
         return lift_many(state, to, tuple(within), options, progress)
     check_start(state, within)
-    # what hides in the steps of one state is searched for afterwards, more thoroughly
-    options = replace(options, record=True, look_inside=False)
     return lift_one(state, to, tuple(within), options, progress)

@@ -202,8 +202,8 @@ class _Job:
         only = inside_only_steps(curve, bracket, options)
         events = Events.join([shown, *block.rare.hidden, *only], curve.metric.size)
         block.rare.hidden = []
-        bad = np.unique(events.lanes[~events.found])
-        again = bad[ledger.retries[bad] < block.options.retries]
+        again = np.unique(events.lanes[~events.found])
+        again = again[ledger.retries[again] < block.options.retries]
         if len(again):
             ledger.retries[again] += 1
             block.drop(again)
@@ -229,9 +229,10 @@ class _Job:
             kind = EventCode(int(events.code[i])).kind
             self.missed[int(events.lanes[i])] = f"the {kind} could not be located"
         last = np.full(len(events.lanes), np.inf)
-        which = np.searchsorted(at, events.lanes)
-        ended = np.isin(events.lanes, at)
-        last[ended] = events.travelled[first][which[ended]]
+        if len(at):
+            which = np.minimum(np.searchsorted(at, events.lanes), len(at) - 1)
+            ended = at[which] == events.lanes
+            last[ended] = events.travelled[first][which[ended]]
         passing = ((events.code & ~stop) != 0) & (events.travelled < last)
         for i in np.flatnonzero(passing & ~events.found):
             kind = EventCode(int(events.code[i])).kind

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, replace
 from enum import IntEnum, StrEnum
+from functools import lru_cache
 
 import numpy as np
 
@@ -105,11 +106,7 @@ class TraceOptions:
 
     def table(self) -> Float[np.ndarray, "4 levels"]:
         """First and largest step, turning and number of steps, for the first try and retries."""
-        levels = [self]
-        for _ in range(self.retries):
-            levels.append(levels[-1].finer())
-        knobs = [(x.first_step, x.largest_step, x.turning, x.steps) for x in levels]
-        return np.array(knobs, float).T.copy()
+        return _table(self)
 
     def finer(self) -> "TraceOptions":
         """Return the options of a retry."""
@@ -121,3 +118,12 @@ class TraceOptions:
             steps=self.steps * 4,
             retries=self.retries - 1,
         )
+
+
+@lru_cache(maxsize=16)
+def _table(options: TraceOptions) -> Float[np.ndarray, "4 levels"]:
+    levels = [options]
+    for _ in range(options.retries):
+        levels.append(levels[-1].finer())
+    knobs = [(x.first_step, x.largest_step, x.turning, x.steps) for x in levels]
+    return np.array(knobs, float).T.copy()
