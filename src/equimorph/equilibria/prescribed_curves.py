@@ -56,9 +56,11 @@ class Pieces:
 
     def value(self, t: Values) -> Columns:
         """Values at t."""
-        inside = np.clip(t, 0.0, 1.0)
-        beyond = (t - inside)[:, None] * self._series(1, inside)
-        return np.asarray(self._series(0, inside) + beyond)
+        inside = np.minimum(np.maximum(t, 0.0), 1.0)
+        out, beyond = self._series(0, inside), t - inside
+        if beyond.any():
+            out += beyond[:, None] * self._series(1, inside)
+        return out
 
     def rate(self, t: Values) -> Columns:
         """First derivative."""
@@ -70,16 +72,15 @@ class Pieces:
         return np.where(within, self._series(2, np.clip(t, 0.0, 1.0)), 0.0)
 
     def _series(self, derivative: int, t: Values) -> Columns:
-        """Clenshaw's recurrence for the piece of each lane."""
+        """Σ c_k cos(k arccos x) for the piece of each lane."""
         last = len(self.breaks) - 2
-        piece = np.clip(np.searchsorted(self.breaks, t, side="right") - 1, 0, last)
+        piece = np.minimum(np.searchsorted(self.breaks, t, side="right") - 1, last)
         low, high = self.breaks[piece], self.breaks[piece + 1]
-        x = ((2.0 * t - low - high) / (high - low))[:, None]
+        x = (2.0 * t - low - high) / (high - low)
         series = self.tables[derivative][self.which, piece]
-        first, second = np.zeros_like(series[:, 0]), np.zeros_like(series[:, 0])
-        for k in range(series.shape[1] - 1, 0, -1):
-            first, second = series[:, k] + 2.0 * x * first - second, first
-        return np.asarray(series[:, 0] + x * first - second)
+        angle = np.arccos(np.minimum(np.maximum(x, -1.0), 1.0))
+        terms = np.cos(angle[:, None] * np.arange(series.shape[1]))
+        return np.einsum("lk,lkc->lc", terms, series)
 
     def lengths(self, scales: Float[np.ndarray, " columns"]) -> Values:
         """Length of each lane's curve, columns measured by their scales."""
@@ -233,7 +234,11 @@ class TrackedCurve:
 
     def states(self, z: Extended, t: Values) -> tuple[Lanes, Parameters]:
         """Unknowns and multipliers of the structure, and all parameters."""
-        n, k, p = self.structure.unknowns, len(self.free), self.parameters(t)
+        return self._states(z, self.parameters(t))
+
+    def _states(self, z: Extended, given: Parameters) -> tuple[Lanes, Parameters]:
+        """The same, from the parameters that are given."""
+        n, k, p = self.structure.unknowns, len(self.free), given.copy()
         p[:, self.free] = z[:, n : n + k]
         return np.concatenate([z[:, :n], z[:, n + k :]], axis=1), p
 
@@ -261,19 +266,23 @@ class TrackedCurve:
 
         The set has k + 1 directions here; the descriptors and the closing row are k + 1 conditions.
         """
-        structure, (x, p), k = self.structure, self.states(z, t), len(self.free)
-        size, changes = structure.size, self._changes(self.rate(t))
+        structure, k, many = self.structure, len(self.free), len(self.structure.parameters)
+        given, slope = self.prescribed.value(t), self.prescribed.rate(t)
+        x, p = self._states(z, given[:, :many])
+        rate = slope[:, :many].copy()
+        rate[:, self.free] = 0.0
+        size, changes = structure.size, self._changes(rate)
         residual = structure.residual(x, p)
         solved = _tangent_space(structure, x, p, residual, changes)
         onto, along = solved.x[:, 0], solved.x[:, 1:]
-        linear = self._linear(x, p, t, solved.x, changes)
+        linear = self._linear((x, p), given[:, many:], slope[:, many:], solved.x, changes)
         closing = self._closing(solved.x, row, corner)
         matrix = np.concatenate([linear.slopes, closing[:, None, 1:]], axis=1)
         rhs = np.zeros((len(z), 2, k + 1))
         rhs[:, 0, :k], rhs[:, 0, k], rhs[:, 1, k] = -linear.value, -defect - closing[:, 0], 1.0
         step, tangent = (_solve_small(matrix, rhs) @ along).transpose(1, 0, 2)
         step += onto
-        missed = self._values(x, p) - self._targets(t)
+        missed = self._values(x, p) - given[:, many:]
         return Advance(
             self._join(step[:, :size], step[:, size:-1]),
             step[:, -1].copy(),
@@ -284,26 +293,25 @@ class TrackedCurve:
             np.full(len(z), np.nan),
         )
 
-    def _targets(self, t: Values) -> Float[np.ndarray, "lanes k"]:
-        """S*(t)."""
-        return self.prescribed.value(t)[:, len(self.structure.parameters) :]
-
     def _linear(
         self,
-        z: Lanes,
-        p: Parameters,
-        t: Values,
+        states: tuple[Lanes, Parameters],
+        targets: Float[np.ndarray, "lanes k"],
+        slope: Float[np.ndarray, "lanes k"],
         moves: Float[np.ndarray, "lanes moves bordered"],
         changes: Float[np.ndarray, "lanes directions parameters"],
     ) -> Linear:
-        """S − S* after the first move, onto the set, and its slopes along the others."""
-        structure, size = self.structure, self.structure.size
+        """S − S* after the first move, onto the set, and its slopes along the others.
+
+        targets, slope: S* and its rate.
+        """
+        structure, size, (z, p) = self.structure, self.structure.size, states
         dz, dp = moves[:, :, :size], moves[:, :, size:] @ changes
         functions = tuple(descriptor.function for descriptor in self.descriptors)
-        takes = DescriptorValues(functions, self._targets(t), METRIC_DIFFERENCE)
+        takes = DescriptorValues(functions, targets, METRIC_DIFFERENCE)
         move = Move(dz[:, 0], dp[:, 0], dz[:, 1:], dp[:, 1:])
         found = takes.linear(Critical(structure, z, p, z), move)
-        rate = self.prescribed.rate(t)[:, len(structure.parameters) :, None] * moves[:, None, :, -1]
+        rate = slope[:, :, None] * moves[:, None, :, -1]
         return Linear(found.value - rate[:, :, 0], found.slopes - rate[:, :, 1:])
 
     def _values(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes k"]:

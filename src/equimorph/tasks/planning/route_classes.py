@@ -7,7 +7,6 @@ know the order in which holes are passed.)
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from heapq import heappop, heappush
 
 import numpy as np
 from scipy.sparse import coo_array
@@ -18,6 +17,7 @@ from equimorph.arrays import Bool, Edges, Float, Int
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Constraint, Descriptor
 from equimorph.structures import State, States
+from equimorph.tasks.planning.kernels import search_classes
 from equimorph.tasks.planning.network import (
     Demands,
     Ends,
@@ -43,7 +43,6 @@ MOST_TURNS = 2
 """How often a path may pass around one hole."""
 LABELS = 8
 """Classes that are kept at a vertex, for each requested route."""
-Class = tuple[int, ...]
 
 
 @check_arguments
@@ -149,63 +148,36 @@ class _Classes:
         """States along the best paths of up to `count` classes; all their links can be lifted."""
         pairs = self.network.pairs[self.inner]
         while True:
-            paths = [path for _, path in self._search(count)]
+            paths = self._search(count)
             used = self.inner[on_paths(pairs, paths)]
             if self.network.lift_links(used, self.states, self.demands):
                 return [self.states[path] for path in paths]
 
-    def _search(self, count: int) -> list[tuple[Class, Int[np.ndarray, " n"]]]:
-        """Dijkstra's algorithm on (vertex, class)."""
-        beside = self._beside()
-        nodes, holes = len(self.states), self.graph.values.shape[1]
-        start, goal = nodes - 2, nodes - 1
-        zero: Class = (0,) * holes
-        queue: list[tuple[float, int, Class, int]] = [(0.0, start, zero, -1)]
-        done: dict[tuple[int, Class], int] = {}
-        before: list[tuple[int, int]] = []
-        visits = np.zeros(nodes, int)
-        found: list[tuple[Class, Int[np.ndarray, " n"]]] = []
-        while queue and len(found) < count:
-            cost, node, own, parent = heappop(queue)
-            if (node, own) in done or visits[node] >= LABELS * count:
-                continue
-            visits[node] += 1
-            done[node, own] = len(before)
-            before.append((node, parent))
-            if node == goal:
-                found.append((own, _trace_back(before, len(before) - 1)))
-                continue
-            for other, step, change in beside[node]:
-                new = own
-                if change is not None:
-                    new = tuple(a + b for a, b in zip(own, change, strict=True))
-                    if max(map(abs, new)) > MOST_TURNS:
-                        continue
-                if (other, new) not in done:
-                    heappush(queue, (cost + step, other, new, len(before) - 1))
-        return found
-
-    def _beside(self) -> list[list[tuple[int, float, Class | None]]]:
-        """Neighbours of each node, with costs and changes of class."""
-        graph, beside = self.graph, [[] for _ in range(len(self.states))]  # type: ignore[var-annotated]
+    def _search(self, count: int) -> list[Int[np.ndarray, " n"]]:
+        """Paths of the best classes, by Dijkstra's algorithm on (vertex, class)."""
+        graph, nodes = self.graph, len(self.states)
         good = np.ones(len(graph.pairs), bool)
         good[: len(self.inner)] = ~self.broken[self.inner]
-        passing = np.flatnonzero(good & graph.values.any(axis=1))
-        change = {k: tuple(graph.values[k].tolist()) for k in passing.tolist()}
-        rows = np.flatnonzero(good)
-        for k, (a, b), cost in zip(
-            rows.tolist(), graph.pairs[rows].tolist(), graph.costs[rows].tolist(), strict=True
-        ):
-            there = change.get(k)
-            beside[a].append((b, cost, there))
-            beside[b].append((a, cost, there and tuple(-each for each in there)))
-        return beside
+        pairs, costs, values = graph.pairs[good], graph.costs[good], graph.values[good]
+        both = np.concatenate([pairs, pairs[:, ::-1]])
+        order = np.argsort(both[:, 0], kind="stable")
+        starts = np.searchsorted(both[order, 0], np.arange(nodes + 1))
+        found, labels, _ = search_classes(
+            starts,
+            np.ascontiguousarray(both[order, 1]),
+            np.tile(costs, 2)[order],
+            np.concatenate([values, -values])[order],
+            np.array([nodes - 2, nodes - 1]),
+            np.array([count, LABELS * count, MOST_TURNS]),
+        )
+        return [_trace_back(labels, last) for last in found.tolist()]
 
 
-def _trace_back(before: list[tuple[int, int]], last: int) -> Int[np.ndarray, " n"]:
+def _trace_back(labels: Int[np.ndarray, "labels 3"], last: int) -> Int[np.ndarray, " n"]:
+    """Nodes of the path to a label, given node, class and parent of each."""
     way = []
     while last >= 0:
-        node, last = before[last]
+        node, _, last = labels[last].tolist()
         way.append(node)
     return np.array(way[::-1])
 
