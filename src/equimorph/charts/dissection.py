@@ -164,7 +164,7 @@ class _Work:
         """The same with vertices at the cusps, where sheets part that a cut has to part."""
         if self.fabric.dimension != 2:
             return self
-        fabric, cusps = add_cusp_vertices(self.fabric)
+        fabric, cusps = add_cusp_vertices(self.excerpt, self.fabric)
         if len(cusps) == 0:
             return self
         return replace(self, fabric=fabric, cusps=tuple(cusps.tolist()))._untangle()

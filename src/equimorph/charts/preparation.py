@@ -6,9 +6,10 @@ import numpy as np
 
 from equimorph.arrays import Bool, Facets, Float, Int, ItemFlags, Items, Pairs, VertexNumbers
 from equimorph.manifold import EquilibriumSet
-from equimorph.manifold.complex.excerpts import excerpt_of
-from equimorph.manifold.complex.kept_tables import kept
+from equimorph.manifold.complex.excerpts import Excerpt, excerpt_of
+from equimorph.manifold.complex.kept_tables import from_cache, kept
 from equimorph.manifold.complex.marked_complex import Fabric
+from equimorph.manifold.complex.vertices import Vertices
 from equimorph.manifold.geometry.points import VertexKind, on_fold
 from equimorph.manifold.geometry.simplices import volumes
 from equimorph.manifold.geometry.topology import (
@@ -80,12 +81,20 @@ def on_box(eset: EquilibriumSet, facets: Facets) -> ItemFlags:
     return out
 
 
-def add_cusp_vertices(fabric: Fabric) -> tuple[Fabric, Int[np.ndarray, " cusps"]]:
-    """A fabric over two parameters with vertices at its cusps, and which of them these are."""
-    count = len(fabric.vertices)
-    ends, found = cusps_on_edges(fabric)
+def add_cusp_vertices(excerpt: Excerpt, fabric: Fabric) -> tuple[Fabric, Int[np.ndarray, " cusps"]]:
+    """An excerpt over two parameters with vertices at its cusps, and which of them these are.
+
+    `fabric`: what was made of its cells; all of its vertices are those of the excerpt.
+    """
+    count, used = len(fabric.vertices), excerpt.used
+
+    def cusps() -> tuple[Pairs, Vertices]:
+        ends, found = cusps_on_edges(excerpt.fabric)
+        return used[ends], found
+
+    ends, found = from_cache(excerpt.eset, "cusps", cusps)
     if len(ends):
-        fabric = fabric.bisect(ends, found)
+        fabric = fabric.bisect(np.searchsorted(used, ends), found)
     return fabric, np.arange(count, len(fabric.vertices))
 
 
@@ -99,7 +108,7 @@ def with_cusp_vertices(eset: EquilibriumSet) -> EquilibriumSet:
 def _with_cusps(eset: EquilibriumSet) -> EquilibriumSet | None:
     folded = on_fold(eset.kinds)
     excerpt = excerpt_of(eset, count_corners(folded, eset.cells) >= len(eset.names), folded)
-    fabric, cusps = add_cusp_vertices(excerpt.fabric)
+    fabric, cusps = add_cusp_vertices(excerpt, excerpt.fabric)
     return whole_set(excerpt.put_back(fabric)) if len(cusps) else None
 
 

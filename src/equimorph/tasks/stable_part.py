@@ -67,7 +67,7 @@ def stable_piece(
     stratum, _ = pieces_of(eset, state)
     if stratum < 0:
         return None
-    piece = part(eset, eset.stratum == stratum)
+    piece = from_cache(eset, ("part", stratum), lambda: part(eset, eset.stratum == stratum))
     for constraint in within:
         if len(piece.cells):
             piece = restricted(piece, constraint)

@@ -43,7 +43,8 @@ class Complex:
     """Vertices, cells and marked facets, from which everything else about a set follows.
 
     index: negative eigenvalues at the vertices, kinds and grid_vertex as in `EquilibriumSet`;
-    folds, caps, crossings (n, d): facets on folds, on constraints and where sheets cross.
+    folds, caps, crossings (n, d): facets on folds, on constraints and where sheets cross; fresh:
+    cells whose vertices were not checked yet, all if None.
     """
 
     points: States
@@ -55,6 +56,25 @@ class Complex:
     folds: Int[np.ndarray, "f d"]
     caps: Int[np.ndarray, "c d"]
     crossings: Int[np.ndarray, "x d"]
+    fresh: CellFlags | None = None
+
+    @property
+    def unchecked(self) -> "Complex":
+        """The fresh cells with their vertices; facets are those of all."""
+        if self.fresh is None:
+            return self
+        cells = self.cells[self.fresh]
+        held = np.bincount(cells.ravel(), minlength=len(self.points)) > 0
+        number = np.cumsum(held) - 1
+        vertices = {name: getattr(self, name)[held] for name in ("kinds", "index", "grid_vertex")}
+        return replace(
+            self,
+            points=self.points[held],
+            cells=number[cells],
+            cell_index=self.cell_index[self.fresh],
+            fresh=None,
+            **vertices,
+        )
 
 
 @dataclass(frozen=True)
@@ -130,6 +150,8 @@ def describe(frame: Frame, given: Complex, lifting: Lifting) -> EquilibriumSet:
 def describe_again(eset: EquilibriumSet, given: Complex, setting: Setting) -> EquilibriumSet:
     """Describe a set whose cells have changed; what was counted as it was lifted is kept."""
     audit = eset.audit
+    if audit.wrong:
+        given = replace(given, fresh=None)
     lifting = Lifting(**{each.name: getattr(audit, each.name) for each in fields(Lifting)})
     frame = Frame(setting, eset.mesh, eset.box, dict(eset.fixed), eset.intervals)
     out = describe(frame, given, lifting)
@@ -190,7 +212,7 @@ def _components(
                 int(own.sum()),
                 euler_characteristic(corners[own], edges[k]),
                 int(held[at_loops].sum()),
-                tuple(np.unique(cell_index[own]).tolist()),
+                tuple(np.flatnonzero(np.bincount(cell_index[own])).tolist()),
             )
         )
     return tuple(out)
@@ -224,11 +246,12 @@ def _audit(
     else:
         sense = senses(corners, cell_index, coordinates, whole, component)
     edges = len(whole.facets) if whole.facets.shape[1] == PAIR else None
-    wrong = contradictions(points, given.kinds, corners, cell_index)
-    wrong |= overturned_off_folds(
+    wrong = overturned_off_folds(
         given.kinds, corners, sense.overturned, coordinates / setting.scales
     )
-    wrong |= beyond_bounds(points, corners, setting.constraints)
+    new, fresh = given.unchecked, slice(None) if given.fresh is None else given.fresh
+    wrong[fresh] |= contradictions(new.points, new.kinds, new.cells, new.cell_index)
+    wrong[fresh] |= beyond_bounds(new.points, new.cells, setting.constraints)
     whole_crossing = whole.counts == SHEETS_AT_A_CROSSING
     most = np.where(crossed, SHEETS_AT_A_CROSSING, 2)
     kinds = [boundary.kind for boundary in boundaries]

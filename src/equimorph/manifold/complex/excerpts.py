@@ -141,6 +141,9 @@ class Excerpt:
         more = fabric.vertices.take(np.arange(count, len(fabric.vertices)))
         number = np.concatenate([self.used, len(sheets.origin) + np.arange(len(more))])
         made, cells, index = number[fabric.cells], sheets.cells.copy(), self.eset.cell_index.copy()
+        fresh = np.ones(len(cells) + len(made) - own, bool)
+        fresh[: len(cells)] = False
+        fresh[self.numbers] = (made[:own] != cells[self.numbers]).any(axis=1)
         cells[self.numbers], index[self.numbers] = made[:own], fabric.cell_index[:own]
         known = sheets.marks > 0
         return Recut(
@@ -150,6 +153,7 @@ class Excerpt:
             np.concatenate([index, fabric.cell_index[own:]]),
             np.concatenate([sheets.whole.facets[known], number[fabric.facets]]),
             np.concatenate([sheets.marks[known], fabric.marks]),
+            fresh,
         )
 
 
@@ -167,6 +171,8 @@ class Recut:
         All cells.
     facets, marks
         Marked facets, those that were cut among them.
+    fresh
+        Cells that the set does not have.
     """
 
     eset: EquilibriumSet
@@ -175,6 +181,7 @@ class Recut:
     cell_index: CellNumbers
     facets: Int[np.ndarray, "F d"]
     marks: Int[np.ndarray, " F"]
+    fresh: CellFlags
 
     @cached_property
     def points(self) -> VertexNumbers:
@@ -232,6 +239,7 @@ class Recut:
             folds,
             caps,
             crossings,
+            self.fresh[chosen],
         )
 
     def _marked(self, cells: Cells, on_level: VertexFlags) -> tuple[Facets, Items]:
