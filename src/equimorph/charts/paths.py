@@ -11,6 +11,7 @@ from scipy.sparse.csgraph import dijkstra
 from equimorph.arrays import CellFlags, CellNumbers, Float, Int, VertexFlags
 from equimorph.charts.preparation import first_copies
 from equimorph.manifold import EquilibriumSet
+from equimorph.manifold.complex.kept_tables import adjacency_of, places_of
 from equimorph.manifold.geometry.points import are_singular, on_fold
 from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.geometry.topology import Adjacency, adjacency, faces_of
@@ -102,7 +103,7 @@ def _chain(eset: EquilibriumSet, start: State, middle: States | None, goal: Stat
 def _over_edges(eset: EquilibriumSet, start: Place, goal: Place) -> list[int] | None:
     """Vertices of the shortest way over edges from one cell to another."""
     setting, count = eset.setting, len(eset.points)
-    place = embed(setting, eset.points.z, eset.points.p)
+    place = places_of(eset)
     pairs = faces_of(eset.cells, 2) if eset.cells.shape[1] > 2 else eset.cells
     pairs = pairs[~_at_end(eset)[pairs].any(axis=1)]
     links, lengths = [pairs], [np.linalg.norm(place[pairs[:, 0]] - place[pairs[:, 1]], axis=1)]
@@ -126,7 +127,7 @@ def _over_edges(eset: EquilibriumSet, start: Place, goal: Place) -> list[int] | 
 
 def _at_end(eset: EquilibriumSet) -> VertexFlags:
     """Vertices on folds at which the set ends: no way should touch them."""
-    whole, at = adjacency(eset.cells), np.zeros(len(eset.points), bool)
+    whole, at = adjacency_of(eset), np.zeros(len(eset.points), bool)
     at[whole.facets[whole.counts == 1]] = True
     return np.asarray(at & on_fold(eset.kinds))
 

@@ -18,6 +18,7 @@ from scipy.spatial import cKDTree
 from equimorph.arrays import Float, Frames, Items, Place, Places, Points
 from equimorph.charts.coordinates import Coordinates, solve_on_the_set
 from equimorph.charts.location import Cells, Found
+from equimorph.manifold.complex.kept_tables import places_of
 from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.geometry.tangents import frames_in_embedding, split_step, tangent_frames
 from equimorph.manifold.lookup.cell_index import Hits
@@ -83,9 +84,7 @@ class SingularPairs:
 
     @cached_property
     def _middles(self) -> cKDTree:
-        setting, eset = self.coordinates.setting, self.cells.eset
-        place = embed(setting, eset.points.z, eset.points.p)
-        return cKDTree(place[self.cells.corners].mean(axis=1))
+        return cKDTree(places_of(self.cells.eset)[self.cells.corners].mean(axis=1))
 
     def _nearest_cells(self, states: States) -> Numbers:
         """Places, among the cells, of those whose middles are nearest."""

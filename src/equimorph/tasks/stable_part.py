@@ -6,7 +6,7 @@ import numpy as np
 
 from equimorph.arrays import Bool, Float, Int
 from equimorph.manifold import EquilibriumSet, part, restricted
-from equimorph.manifold.complex.kept_tables import from_cache, kept
+from equimorph.manifold.complex.kept_tables import from_cache, kept, places_of
 from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.geometry.topology import faces_of
 from equimorph.manifold.queries.locate import cell_of, pieces_of
@@ -82,7 +82,7 @@ def cell_near(eset: EquilibriumSet, state: State) -> int:
     if found >= 0:
         return found
     setting = eset.setting
-    corners = embed(setting, eset.points.z, eset.points.p)[eset.cells]
+    corners = places_of(eset)[eset.cells]
     here = embed(setting, state.z[None], state.p[None])[0]
     count = eset.cells.shape[1]
     picks = np.array(list(combinations_with_replacement(range(count), PARTS)))

@@ -7,13 +7,14 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 
 from equimorph.argument_checks import check_arguments
-from equimorph.arrays import Facets, Float, Int, Items, Lanes, Parameters, Some
+from equimorph.arrays import Facets, Float, Int, Items, ItemValues, Lanes, Pairs, Parameters, Some
 from equimorph.equilibria import lift
 from equimorph.equilibria.critical import Critical, null_border
 from equimorph.errors import InputError
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
+from equimorph.manifold.complex.kept_tables import from_cache, places_of
 from equimorph.manifold.geometry.setting import embed
-from equimorph.manifold.geometry.topology import faces_of
+from equimorph.manifold.geometry.topology import distinct, faces_of
 from equimorph.manifold.queries.geodesics import Chains
 from equimorph.manifold.queries.least_squares import nearest as nearest_points
 from equimorph.manifold.queries.locate import pieces_of
@@ -202,12 +203,8 @@ def _along_the_set(
 def _ways(eset: EquilibriumSet, state: State, stratum: int, boundary: Facets) -> list[SetPoints]:
     """Shortest ways over the edges of a stratum from a state to different parts of its boundary."""
     setting = eset.setting
-    cells = eset.cells[eset.stratum == stratum]
-    pairs = faces_of(cells, 2) if len(eset.names) > 1 else cells
-    place = embed(setting, eset.points.z, eset.points.p)
-    own = embed(setting, state.z[None], state.p[None])
-    length = np.linalg.norm(place[pairs[:, 0]] - place[pairs[:, 1]], axis=1)
-    used = np.unique(cells)
+    pairs, length, used = from_cache(eset, ("edges", stratum), lambda: _edges(eset, stratum))
+    place, own = places_of(eset), embed(setting, state.z[None], state.p[None])
     # the vertices around the state are those of the cells over it that it lies on
     around = _corners_around(eset, state, stratum, used, place, own)
     count = len(eset.points)
@@ -226,6 +223,14 @@ def _ways(eset: EquilibriumSet, state: State, stratum: int, boundary: Facets) ->
             path.append(int(before[path[-1]]))
         ways.append(_from_state(eset, state, np.array(path[::-1])))
     return ways
+
+
+def _edges(eset: EquilibriumSet, stratum: int) -> tuple[Pairs, ItemValues, Items]:
+    """Edges of a stratum, their lengths, and its vertices."""
+    cells, place = eset.cells[eset.stratum == stratum], places_of(eset)
+    pairs = faces_of(cells, 2) if len(eset.names) > 1 else cells
+    length = np.linalg.norm(place[pairs[:, 0]] - place[pairs[:, 1]], axis=1)
+    return pairs, length, distinct(cells.ravel())
 
 
 def _corners_around(

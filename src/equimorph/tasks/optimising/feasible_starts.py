@@ -24,6 +24,9 @@ MOST = 600
 """Cells in which feasible states are searched, the most promising first."""
 ROUNDS = 20
 """Newton steps towards states that obey all constraints."""
+PATIENCE = 4
+"""Steps one after the other that do not lower the least excess by a tenth, after which a lane is
+given up: it goes to and fro."""
 LONGEST = 0.3
 """Longest step in the metric."""
 MET = 1e-8
@@ -182,16 +185,20 @@ def _restore_feasibility(programme: Programme, guess: SetPoints) -> tuple[SetPoi
     kept = np.zeros(len(guess), bool)
     z, p, rows = here.z.copy(), here.p.copy(), here.rows.copy()
     todo = np.flatnonzero(alive)
+    least, idle = np.full(len(guess), np.inf), np.zeros(len(guess), int)
     for _ in range(ROUNDS):
         if len(todo) == 0:
             break
         frames, at = tangents_at(programme.setting, SetPoints(z[todo], p[todo], rows[todo]))
         excess, slopes = programme.linearise(at, frames)
-        good = excess.max(axis=1) <= MET
-        kept[todo[good]] = True
-        step = _towards(excess[~good], slopes[~good])
-        todo, at = todo[~good], at.take(~good)
-        guess_z, guess_p = step_along(programme.setting, at, frames[~good], step)
+        worst = excess.max(axis=1)
+        kept[todo[worst <= MET]] = True
+        idle[todo] = np.where(worst < 0.9 * least[todo], 0, idle[todo] + 1)
+        least[todo] = np.minimum(least[todo], worst)
+        on = np.flatnonzero((worst > MET) & (idle[todo] < PATIENCE))
+        step = _towards(excess[on], slopes[on])
+        todo, at = todo[on], at.take(on)
+        guess_z, guess_p = step_along(programme.setting, at, frames[on], step)
         there, found = project_onto_set(programme.setting, guess_z, guess_p, at.rows)
         todo, there = todo[found], there.take(found)
         z[todo], p[todo], rows[todo] = there.z, there.p, there.rows

@@ -14,7 +14,7 @@ import numpy as np
 from equimorph.arrays import Float, ItemFlags, Items, Some
 from equimorph.equilibria import settle
 from equimorph.manifold import EquilibriumSet
-from equimorph.manifold.complex.kept_tables import from_cache
+from equimorph.manifold.complex.kept_tables import places_of
 from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.queries.nearest import SetPoints, cells_around, points_at_vertices
 from equimorph.model import Constraint
@@ -272,11 +272,7 @@ class _Search:
     @property
     def _places(self) -> Float[np.ndarray, "V coordinates"]:
         """Vertices in the metric; kept with the set."""
-        points = self.eset.points
-        found = from_cache(
-            self.eset, "places", lambda: embed(self.eset.setting, points.z, points.p)
-        )
-        return np.asarray(found)
+        return places_of(self.eset)
 
     def _near(self, place: Float[np.ndarray, " coordinates"], reach: float) -> Items:
         """Facets with all vertices within a distance."""
