@@ -225,7 +225,7 @@ def _ways(eset: EquilibriumSet, state: State, stratum: int, boundary: Facets) ->
     return ways
 
 
-def _edges(eset: EquilibriumSet, stratum: int) -> tuple[Pairs, ItemValues, Items]:
+def _edges(eset: EquilibriumSet, stratum: int) -> tuple[Pairs, ItemValues, Some]:
     """Edges of a stratum, their lengths, and its vertices."""
     cells, place = eset.cells[eset.stratum == stratum], places_of(eset)
     pairs = faces_of(cells, 2) if len(eset.names) > 1 else cells
@@ -237,7 +237,7 @@ def _corners_around(
     eset: EquilibriumSet,
     state: State,
     stratum: int,
-    used: Items,
+    used: Some,
     place: Float[np.ndarray, "V coordinates"],
     own: Float[np.ndarray, "1 coordinates"],
 ) -> Int[np.ndarray, " corners"]:
