@@ -80,7 +80,7 @@ class Pieces:
         series = self.tables[derivative][self.which, piece]
         angle = np.arccos(np.minimum(np.maximum(x, -1.0), 1.0))
         terms = np.cos(angle[:, None] * np.arange(series.shape[1]))
-        return np.einsum("lk,lkc->lc", terms, series)
+        return np.asarray(np.einsum("lk,lkc->lc", terms, series))
 
     def lengths(self, scales: Float[np.ndarray, " columns"]) -> Values:
         """Length of each lane's curve, columns measured by their scales."""
