@@ -122,6 +122,11 @@ def results_of(tasks: Sequence[Callable[[], Result]]) -> Iterator[Result]:
             job.cancel()
 
 
+def start(task: Callable[[], Result]) -> Callable[[], Result]:
+    """Start a task on another thread, if there is one; what is returned waits for its result."""
+    return task if threads() < 2 else _pool().submit(task).result
+
+
 def threads() -> int:
     """Number of threads that share the work, see `set_threads`; 1 inside a thread of the pool."""
     return 1 if hasattr(_worker, "own") else _number.chosen

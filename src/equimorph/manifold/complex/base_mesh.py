@@ -1,6 +1,7 @@
 """Triangulation of the parameter box on which the equilibrium set is lifted."""
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -41,12 +42,23 @@ class BaseMesh:
         """Simplices that fill the box: edges, triangles or tetrahedra."""
         return (self.edges, self.triangles, self.tetrahedra)[self.dimension - 1]
 
-    @property
+    @cached_property
     def edges_in_use(self) -> EdgeFlags:
         """Which edges have not been bisected."""
         used = np.full(len(self.edges), self.dimension == 1)
         used[self.sides] = True
         return used
+
+    @cached_property
+    def _largest_spans(self) -> Place:
+        """Largest change of each free parameter along an edge."""
+        largest = np.abs(self.vertices[self.edges[:, 1]] - self.vertices[self.edges[:, 0]])
+        return np.asarray(largest.max(axis=0))
+
+    def spans(self, edges: Int[np.ndarray, "*some"]) -> Float[np.ndarray, "*some d"]:
+        """Changes of the free parameters along edges, relative to the largest ones."""
+        ends = self.vertices[self.edges[edges]]
+        return np.asarray((ends[..., 1, :] - ends[..., 0, :]) / self._largest_spans)
 
     def covers(self, points: Places) -> ItemFlags:
         """Which points lie in the box, up to round-off."""

@@ -1,11 +1,13 @@
 """From a complex to an equilibrium set: pieces, folds, boundaries and the audit."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, replace
+from functools import partial
 
 import numpy as np
 
 from equimorph.arrays import Bool, CellFlags, CellNumbers, Cells, Float, Int, VertexNumbers
+from equimorph.linalg.lanes import start
 from equimorph.manifold.complex.audit import Audit
 from equimorph.manifold.complex.base_mesh import BaseMesh
 from equimorph.manifold.complex.equilibrium_set import (
@@ -103,6 +105,7 @@ class Lifting:
 def describe(frame: Frame, given: Complex, lifting: Lifting) -> EquilibriumSet:
     """Pieces, folds, boundaries and audit of a complex."""
     corners, points = given.cells, given.points
+    checked = start(partial(_check_points, given, frame.setting.constraints))
     whole = adjacency(corners)
     folds, caps, crossed = (
         flags_of(whole.facets, each) for each in (given.folds, given.caps, given.crossings)
@@ -122,7 +125,7 @@ def describe(frame: Frame, given: Complex, lifting: Lifting) -> EquilibriumSet:
         Stratum(int(given.cell_index[own[0]]), len(own), int(component[own[0]]))
         for own in (np.flatnonzero(stratum == k) for k in range(stratum.max(initial=-1) + 1))
     )
-    audit = _audit(given, lifting, crossed, whole, component, boundaries, frame.setting)
+    audit = _audit(given, lifting, crossed, whole, component, boundaries, frame.setting, checked)
     return EquilibriumSet(
         structure=frame.setting.structure,
         box=frame.box,
@@ -228,6 +231,26 @@ def _edges_of(whole: Adjacency, component: CellNumbers) -> list[int | None]:
     return list(np.bincount(of_facet, minlength=many).tolist())
 
 
+@dataclass(frozen=True)
+class _Checked:
+    """What is computed anew at all points: cells of wrong index or beyond bounds, and numbers."""
+
+    wrong: CellFlags
+    largest_residual: float
+    unresolved: int
+
+
+def _check_points(given: Complex, constraints: tuple[Constraint, ...]) -> _Checked:
+    """Index, constraints, residual and resolution at all points."""
+    points, new = given.points, given.unchecked
+    wrong = np.zeros(len(given.cells), bool)
+    fresh = slice(None) if given.fresh is None else given.fresh
+    wrong[fresh] = contradictions(new.points, new.kinds, new.cells, new.cell_index)
+    wrong[fresh] |= beyond_bounds(new.points, new.cells, constraints)
+    residual = float(points.residual.max(initial=0.0))
+    return _Checked(wrong, residual, int((~points.resolved).sum()))
+
+
 def _audit(
     given: Complex,
     lifting: Lifting,
@@ -236,6 +259,7 @@ def _audit(
     component: CellNumbers,
     boundaries: tuple[Boundary, ...],
     setting: Setting,
+    checked: Callable[[], _Checked],
 ) -> Audit:
     corners, cell_index, points = given.cells, given.cell_index, given.points
     coordinates = points.p[:, setting.free]
@@ -249,9 +273,8 @@ def _audit(
     wrong = overturned_off_folds(
         given.kinds, corners, sense.overturned, coordinates / setting.scales
     )
-    new, fresh = given.unchecked, slice(None) if given.fresh is None else given.fresh
-    wrong[fresh] |= contradictions(new.points, new.kinds, new.cells, new.cell_index)
-    wrong[fresh] |= beyond_bounds(new.points, new.cells, setting.constraints)
+    at_points = checked()
+    wrong |= at_points.wrong
     whole_crossing = whole.counts == SHEETS_AT_A_CROSSING
     most = np.where(crossed, SHEETS_AT_A_CROSSING, 2)
     kinds = [boundary.kind for boundary in boundaries]
@@ -268,11 +291,11 @@ def _audit(
         euler_characteristic=euler_characteristic(corners, edges),
         components=int(component.max(initial=-1)) + 1,
         loops=tuple((str(kind), kinds.count(kind)) for kind in sorted(set(kinds))),
-        largest_residual=float(points.residual.max(initial=0.0)),
+        largest_residual=at_points.largest_residual,
         checked=0,
         missing=0,
         recovered=0,
-        unresolved=int((~points.resolved).sum()),
+        unresolved=at_points.unresolved,
     )
 
 

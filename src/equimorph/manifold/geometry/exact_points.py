@@ -8,6 +8,7 @@ See docs/decisions.md, "A fold point must part the right indices".
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import product
 
 import numpy as np
@@ -23,6 +24,7 @@ from equimorph.equilibria.point_conditions import (
     Values as TakesValues,
 )
 from equimorph.equilibria.settle import Guards, Planes, Settled, Tangents, settle
+from equimorph.linalg.lanes import results_of
 from equimorph.manifold.geometry.crossings import reduction
 from equimorph.manifold.geometry.points import Points, VertexKind
 from equimorph.manifold.geometry.setting import Setting, embed, principal_directions
@@ -41,12 +43,14 @@ LAST = 1e-9
 """Length of a step after which there is none: its error is its square."""
 FOLLOWING = 1e-13
 """Length of the following step, as the last two tell, that is not worth taking."""
+AT_ONCE = 512
+"""Groups of points that are computed together, while other threads compute other ones."""
 RESIDUAL = 1e-9
 """Residual of points at which sheets cross, where the equations are singular."""
 
 
 @dataclass(frozen=True)
-class Pinned:
+class Pinned(Columns):
     """Points with their parameters, and which of them can be trusted."""
 
     z: Lanes
@@ -251,6 +255,24 @@ def pin(
     member, share
         A member of the groups, and the share of the way towards it at which the middle is taken.
     """
+    parts = [slice(at, at + AT_ONCE) for at in range(0, max(len(groups), 1), AT_ONCE)]
+    tasks = [
+        partial(_pin_some, setting, points, groups[part], kind, span[part], member, share)
+        for part in parts
+    ]
+    return Pinned.concatenate(list(results_of(tasks)))
+
+
+def _pin_some(
+    setting: Setting,
+    points: Points,
+    groups: Sequence[Sequence[int]],
+    kind: int,
+    span: Span,
+    member: int,
+    share: float,
+) -> Pinned:
+    """Exact points in the middle of some groups."""
     z, p, deviations = middles(setting, points, groups)
     towards = np.array([group[member] for group in groups], int)
     z += share * (points.z[towards] - z)

@@ -81,7 +81,7 @@ class Points:
         grown = max(2 * capacity, self.count + extra, 64)
         for name in ("z", "p", "index", "kind", "vertex", "edge", "following"):
             old = getattr(self, name)
-            new = np.full((grown, *old.shape[1:]), -1, dtype=old.dtype)
+            new = np.empty((grown, *old.shape[1:]), old.dtype)  # takes no memory until it is used
             new[:capacity] = old
             setattr(self, name, new)
 

@@ -89,10 +89,10 @@ def _around(pairing: Pairing) -> Float[np.ndarray, "T 6"]:
     """Curves and points of each triangle; if they change, its discs are computed again."""
     mesh, points, curves = pairing.mesh, pairing.points, pairing.curves
     rays = pairing.rays[: points.count]
-    in_use = np.zeros(len(curves.edge), bool)
+    in_use = np.zeros(curves.count, bool)
     in_use[rays[rays >= 0]] = True
     live = np.flatnonzero(in_use)
-    edge = np.array(curves.edge, int)[live]
+    edge = curves.edge[live]
     # sums of irrational shares differ for different sets of curves
     share = np.modf((live + 1) * np.sqrt(2.0))[0]
     of_edge = np.bincount(edge, share, len(mesh.edges)).astype(float)
@@ -193,7 +193,7 @@ def _segments(pairing: Pairing) -> Cells:
     points, curves = pairing.points, pairing.curves
     pairs: list[tuple[int, int]] = []
     for curve, (edge, start, end) in enumerate(
-        zip(curves.edge, curves.start, curves.end, strict=True)
+        zip(curves.edge.tolist(), curves.start.tolist(), curves.end.tolist(), strict=True)
     ):
         if pairing.ray(start, edge) == curve:
             line = [start, *curves.inner.get(curve, []), *([end] if end >= 0 else [])]
@@ -254,12 +254,12 @@ def _parity_violations(pairing: Pairing) -> int:
     It is the other way round behind a crossing, where det [F_z F_t; tᵀ] changes its sign.
     """
     curves, points = pairing.curves, pairing.points
-    start, end = np.array(curves.start, int), np.array(curves.end, int)
-    crossed = np.zeros(len(start), int)
-    for curve, inner in curves.inner.items():
-        crossed[curve] = np.count_nonzero(points.kind[inner] == VertexKind.CROSSING)
-    closed = end >= 0
-    start, end = start[closed], end[closed]
+    own = np.repeat(list(curves.inner), [len(inner) for inner in curves.inner.values()])
+    inner = np.array([point for inner in curves.inner.values() for point in inner], int)
+    crossings = own[points.kind[inner] == VertexKind.CROSSING].astype(int)
+    crossed = np.bincount(crossings, minlength=curves.count)
+    closed = curves.end >= 0
+    start, end = curves.start[closed], curves.end[closed]
     returned = (points.vertex[start] == points.vertex[end]).astype(int)
     change = points.index[start] - points.index[end] - returned - crossed[closed]
     return int((change % 2 == 1).sum())

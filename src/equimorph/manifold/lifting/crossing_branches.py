@@ -97,7 +97,7 @@ def _trace_again(pairing: Pairing, alone: Items) -> None:
     """Forget plain curves over the edges of crossings, and have them traced with more care."""
     edges = set(pairing.points.edge[alone].tolist())
     curves = pairing.curves
-    for curve, edge in enumerate(curves.edge):
+    for curve, edge in enumerate(curves.edge.tolist()):
         if edge in edges and pairing.alive(curve):
             pairing.forget(curve)
     for edge in edges:

@@ -4,12 +4,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from equimorph.arrays import Bool, Float, Int, Items, Places, Triples
+from equimorph.arrays import Bool, Float, Int, Items, Pairs, Places, Triples
 from equimorph.manifold.geometry.exact_points import pin
 from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.geometry.tangents import fold_forms
-from equimorph.manifold.geometry.topology import flags_of
+from equimorph.manifold.geometry.topology import flags_of, keys_of, rows_of
 from equimorph.manifold.lifting.crossing_branches import lonely
 from equimorph.manifold.lifting.crossing_discs import (
     Group,
@@ -21,6 +21,7 @@ from equimorph.manifold.lifting.crossing_discs import (
 )
 from equimorph.manifold.lifting.loops import Loops, Polygon
 from equimorph.manifold.lifting.pairing import Pairing
+from equimorph.manifold.lifting.patterns import cut_by_pattern
 from equimorph.manifold.lifting.polygon_cuts import (
     MEETING,
     SINGULAR,
@@ -77,28 +78,41 @@ class _Found:
 
 
 def assemble(pairing: Pairing, loops: Loops) -> Discs:
-    """Triangulate all polygons; plain ones are triangles already."""
+    """Triangulate all polygons; plain ones are triangles already, others are cut by pattern."""
     found = _Found()
     found.undecided.update(loops.ambiguous, loops.broken)
     found.undecided.update(_alone(pairing))
-    plans = [_plan(pairing, polygon) for polygon in loops.polygons]
+    whole, left = cut_by_pattern(pairing, loops.polygons)
+    found.undecided.update(whole.undecided.tolist())
+    polygons = [*loops.polygons.each(left), *loops.special]
+    plans = [_plan(pairing, polygon) for polygon in polygons]
     _close(pairing, plans, found)
     plans = _join_folds(pairing, plans, found)
     _split_chords(pairing, plans, found)
     _fill(pairing, plans, found)
-    corners = np.concatenate([loops.plain, np.array(found.corners, int).reshape(-1, 3)])
+    plain = len(loops.plain) + len(whole.corners)
+    corners = np.array(found.corners, int).reshape(-1, 3)
+    corners = np.concatenate([loops.plain, whole.corners, corners])
+    index, base = pairing.points.index[loops.plain[:, 0]], pairing.points.count
     crossings = np.array(sorted(found.crossings), int).reshape(-1, 2)
     return Discs(
         corners,
-        np.concatenate([pairing.points.index[loops.plain[:, 0]], np.array(found.index, int)]),
-        np.concatenate([loops.plain_triangle, np.array(found.owner, int)]),
+        np.concatenate([index, whole.index, np.array(found.index, int)]),
+        np.concatenate([loops.plain_triangle, whole.owner, np.array(found.owner, int)]),
         _on(corners, crossings),
-        np.concatenate([np.zeros(len(loops.plain), int), np.array(found.sheet, int)]),
-        np.array(sorted(found.folds), int).reshape(-1, 2),
-        np.array(sorted(found.caps), int).reshape(-1, 2),
+        np.concatenate([np.zeros(plain, int), np.array(found.sheet, int)]),
+        _distinct(whole.folds, found.folds, base),
+        _distinct(whole.caps, found.caps, base),
         crossings,
         np.array(sorted(found.undecided), int),
     )
+
+
+def _distinct(pairs: Pairs, chords: set[Chord], base: int) -> Int[np.ndarray, "m 2"]:
+    """Pairs of points and chords, each once, in order."""
+    more = np.array(list(chords), int).reshape(-1, 2)
+    keys = keys_of(np.concatenate([pairs, more]), base)
+    return rows_of(np.unique(keys), base, 2)
 
 
 def _on(corners: Triples, chosen: Int[np.ndarray, "k 2"]) -> Bool[np.ndarray, "n 3"]:

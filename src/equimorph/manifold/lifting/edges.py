@@ -4,10 +4,11 @@ A fold on a traced edge becomes a vertex of the set, exactly as the trace locate
 """
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
-from equimorph.arrays import Bool, Flags, Float, Int, ItemFlags, Items, Lanes, Numbers
+from equimorph.arrays import Bool, Flags, Float, Int, ItemFlags, Items, Lanes, Numbers, Values
 from equimorph.equilibria import Guards, ParameterLine, TraceOptions, settle
 from equimorph.equilibria.curves import squared_length
 from equimorph.equilibria.settle import Held, lower_index
@@ -22,6 +23,10 @@ from equimorph.model import Constraint, are_feasible
 
 LONGEST = 0.5
 """Step in the metric above which the cheap way is not tried."""
+LEFT = 1e-8
+"""Length of a correction that is left to the tangents (see `Slopes`), which come with one."""
+STEPS = 4
+"""Number of equal steps into which long edges are cut before they count as hard."""
 SAFE = Guards(
     iterations=7, longest=np.inf, converged=1e-8, contraction=0.5, multipliers=MULTIPLIER_WEIGHT
 )
@@ -30,10 +35,15 @@ SAFE = Guards(
 
 @dataclass(frozen=True)
 class Direct:
-    """Points over the other ends, and which of them can be trusted."""
+    """Points over the other ends, which of them can be trusted, and which need pseudo-arclength.
+
+    hard: equal steps would not lead there, either: a constraint is violated, or the first
+    correction is as long as the step, so that it would exceed a share of shorter ones, too.
+    """
 
     z: Lanes
     good: Flags
+    hard: Flags
 
 
 def lift_directly(
@@ -41,17 +51,15 @@ def lift_directly(
     z: Lanes,
     index: Numbers,
     constraints: tuple[Constraint, ...],
-    steps: int = 1,
+    steps: int = STEPS,
 ) -> Direct:
-    """Tangent predictor over the edge, Newton at its end, and the tests of a safe step.
+    """Tangent predictor over parts of edges, Newton at their ends, and the tests of a safe step.
 
-    An edge can be cut into equal `steps`; each must be safe. A lane is good if the first correction
+    Edges are cut into equal `steps`; each must be safe. A lane is good if the first correction
     is below a quarter of the step, later ones shrink at least by half, the index is that of the
     start, the tangents differ by less than acos 0.9, and no constraint is violated. Points are
-    polished to round-off.
+    polished but for the last correction.
     """
-    if steps == 1:
-        return _step(line, z, index, constraints)
     lanes, out, good = np.arange(len(z)), z.copy(), np.zeros(len(z), bool)
     for number in range(steps):
         start = line.start[lanes] + (number / steps) * line.velocity[lanes]
@@ -60,33 +68,47 @@ def lift_directly(
         lanes = lanes[direct.good]
         out[lanes] = direct.z[direct.good]
     good[lanes] = True
-    return Direct(out, good)
+    return Direct(out, good, ~good)
 
 
 def _step(
     line: ParameterLine, z: Lanes, index: Numbers, constraints: tuple[Constraint, ...]
 ) -> Direct:
     """One step over each line, verified."""
-    lanes = len(z)
-    structure, weight = line.structure, line.weight
-    still, one, none = np.zeros_like(z), np.ones(lanes), np.zeros(lanes)
+    still, one, none = np.zeros_like(z), np.ones(len(z)), np.zeros(len(z))
     first = line.advance(z, none, still, one, none)
-    tangent = first.tangent_z
-    length = np.sqrt(squared_length(structure, weight, tangent, one))
-    out, good = z + tangent, (length < LONGEST) & (first.index == index)
+    length = np.sqrt(squared_length(line.structure, line.weight, first.tangent_z, one))
+    out, good = z + first.tangent_z, (length < LONGEST) & (first.index == index)
     todo = np.flatnonzero(good)
-    there, p = line.take(todo), line.take(todo).parameters(one[: len(todo)])
-    longest = np.maximum(FIRST_SHARE * length[todo], SAFE.converged)
-    guards = replace(SAFE, too_long=longest, index=index[todo])
-    end = settle(structure, out[todo], p, there.velocity[:, None], (), guards, Held())
-    out[todo] = end.z
+    tangent = first.tangent_z[todo]
+    end = correct_ends(line.take(todo), out[todo], tangent, length[todo], index[todo], constraints)
+    out[todo], good[todo] = end.z, end.good
+    return Direct(out, good, ~good)
+
+
+def correct_ends(
+    line: ParameterLine,
+    guess: Lanes,
+    tangent: Lanes,
+    length: Values,
+    index: Numbers,
+    constraints: tuple[Constraint, ...],
+) -> Direct:
+    """Newton's method at the ends of steps of some length along tangents, and the tests of them."""
+    structure, weight, one = line.structure, line.weight, np.ones(len(guess))
+    p = line.parameters(one)
+    longest = np.maximum(FIRST_SHARE * length, SAFE.converged)
+    guards = replace(SAFE, too_long=longest, index=index, following=LEFT)
+    end = settle(structure, guess, p, line.velocity[:, None], (), guards, Held())
     end_tangent, n = np.ascontiguousarray(end.frames[:, 0, :-1]), structure.unknowns
-    product = (tangent[todo, :n] * end_tangent[:, :n]) @ structure.mass + there.weight**2
-    end_length = np.sqrt(squared_length(structure, there.weight, end_tangent, one[: len(todo)]))
-    good[todo] = end.found & (product >= LEAST_COSINE * length[todo] * end_length)
-    own = good[todo]
-    good[todo[own]] = are_feasible(constraints, end.z[own], p[own])
-    return Direct(out, good)
+    product = (tangent[:, :n] * end_tangent[:, :n]) @ structure.mass + weight**2
+    end_length = np.sqrt(squared_length(structure, weight, end_tangent, one))
+    good = np.asarray(end.found & (product >= LEAST_COSINE * length * end_length))
+    own = np.flatnonzero(good)
+    good[own] = feasible = are_feasible(constraints, end.z[own], p[own])
+    hard = np.asarray(end.first >= STEPS * FIRST_SHARE * length)
+    hard[own] = ~feasible
+    return Direct(end.z, good, hard)
 
 
 EFFORTS = 4
@@ -248,19 +270,46 @@ def _inner(
         those = rays.take(passed.lanes[at[doubtful]])
         again = _pin(pairing, those, z[doubtful], p[doubtful], VertexKind.FOLD)
         keep[doubtful] = again.found
-    rows: dict[int, list[Inner]] = {}
-    last: dict[int, int] = {}
+    places: dict[int, list[int]] = {}
     for k in np.flatnonzero(keep).tolist():
-        lane = int(passed.lanes[at[k]])
-        own_rows = rows.setdefault(lane, [])
-        if lane in last:
-            both = [last[lane], k]
-            between = _recorded(outcome, line, lane, passed.travelled[at[both]])
-            middle = passed.t[at[both]].mean()
-            own_rows.append(between or _point_at(line, lane, z[both].mean(axis=0)[None], middle))
-        own_rows.append(Inner(z[k], p[k], int(index[k]), VertexKind(kind[k])))
-        last[lane] = k
+        places.setdefault(int(passed.lanes[at[k]]), []).append(k)
+    pairs = [pair for own in places.values() for pair in pairwise(own)]
+    between = iter(_between(outcome, line, at, z, pairs))
+    rows: dict[int, list[Inner]] = {}
+    for lane, events in places.items():
+        rows[lane] = []
+        for k in events:
+            if rows[lane]:
+                rows[lane].append(next(between))
+            rows[lane].append(Inner(z[k], p[k], int(index[k]), VertexKind(kind[k])))
     return rows
+
+
+def _between(
+    outcome: Traces,
+    line: ParameterLine,
+    at: Items,
+    z: Float[np.ndarray, "n size"],
+    pairs: list[tuple[int, int]],
+) -> list[Inner]:
+    """A regular point between each of some pairs of events that follow each other on a lane.
+
+    Recorded ones are near it if there are any; the index is its own: near crossings the tracer met
+    round-off.
+    """
+    if not pairs:
+        return []
+    passed, near, t = outcome.passed, [], []
+    for pair in pairs:
+        both = at[list(pair)]
+        row = _recorded(outcome, int(passed.lanes[both[0]]), passed.travelled[both])
+        near.append(z[list(pair)].mean(axis=0) if row is None else outcome.points.z[row])
+        t.append(passed.t[both].mean() if row is None else outcome.points.t[row])
+    lines = line.take(passed.lanes[at[[first for first, _ in pairs]]])
+    p = lines.parameters(np.array(t))
+    found = settle(line.structure, np.array(near), p, lines.velocity[:, None], (), SAFE, Held()).z
+    index = line.structure.index(found, p).tolist()
+    return [Inner(found[k], p[k], index[k], VertexKind.BETWEEN) for k in range(len(pairs))]
 
 
 def _first_ones(pairing: Pairing, lanes: Items, pinned: Pinned) -> ItemFlags:
@@ -297,9 +346,7 @@ def _pin(
     return pinned
 
 
-def _recorded(
-    outcome: Traces, line: ParameterLine, lane: int, span: Float[np.ndarray, " 2"]
-) -> Inner | None:
+def _recorded(outcome: Traces, lane: int, span: Float[np.ndarray, " 2"]) -> int | None:
     """Recorded point of a lane nearest to the middle of an interval of its length, if any."""
     points = outcome.points
     own = slice(*np.searchsorted(points.lanes, [lane, lane + 1]))
@@ -307,12 +354,4 @@ def _recorded(
     if not inside.any():
         return None
     off = np.abs(points.travelled[own] - span.mean())
-    at = own.start + int(np.argmin(np.where(inside, off, np.inf)))
-    return _point_at(line, lane, points.z[at : at + 1], points.t[at])
-
-
-def _point_at(line: ParameterLine, lane: int, near: Float[np.ndarray, "1 size"], t: float) -> Inner:
-    """Regular point inside an edge, with its own index: near crossings the tracer met round-off."""
-    p, velocity = (line.start + t * line.velocity)[[lane]], line.velocity[[lane]]
-    z = settle(line.structure, near, p, velocity[:, None], (), SAFE, Held()).z
-    return Inner(z[0], p[0], int(line.structure.index(z, p)[0]), VertexKind.BETWEEN)
+    return int(own.start) + int(np.argmin(np.where(inside, off, np.inf)))

@@ -9,13 +9,12 @@ import numpy as np
 
 from equimorph.errors import InputError
 from equimorph.manifold.geometry.points import VertexKind
-from equimorph.manifold.lifting.edges import lift_directly, trace_rays
+from equimorph.manifold.lifting.edges import Direct, correct_ends, lift_directly, trace_rays
 from equimorph.manifold.lifting.hidden_zeros import take_back_hiding
 from equimorph.manifold.lifting.pairing import Pairing, RayMark, Rays
+from equimorph.manifold.lifting.predicted_ends import TOO_LONG, Ends, match_ends
 from equimorph.model import Progress
 
-STEPS = 4
-"""Number of equal steps into which long edges are cut before they count as hard."""
 CHUNK = 4096
 """Rays that are traced together: this bounds the memory."""
 ENDLESS = 250
@@ -33,21 +32,21 @@ def flood(pairing: Pairing, progress: Progress) -> None:
         take_back_hiding(pairing)
         long = pairing.rays_with(RayMark.LONG)
         if len(long.points):
-            _lift(pairing, long, STEPS)
+            _lift_long(pairing, long)
             continue
         hard = _one_of_each_pair(pairing, pairing.rays_with(RayMark.HARD))
         if len(hard.points) == 0:
             return
         for at in range(0, len(hard.points), CHUNK):
             trace_rays(pairing, hard.take(slice(at, at + CHUNK)))
-        pairing.looked_at = len(pairing.curves.edge)  # steps of traces are judged as they are made
+        pairing.looked_at = pairing.curves.count  # steps of traces are judged as they are made
 
 
 def flood_directly(pairing: Pairing, progress: Progress) -> None:
     """Lift edges from all known points as far as single steps lead."""
     pairing.fit()
     while not pairing.is_full and len((rays := pairing.rays_with(RayMark.UNTRACED)).points):
-        _lift(pairing, rays, 1)
+        _step_over(pairing, rays)
         _refuse_endless(pairing)
         live = np.count_nonzero(pairing.points.kind[: pairing.points.count] == VertexKind.GRID)
         progress.report("lifting edges", int(live), None)
@@ -77,20 +76,54 @@ def _one_of_each_pair(pairing: Pairing, rays: Rays) -> Rays:
     return rays.take(even | ~has_even[rays.edges])
 
 
-def _lift(pairing: Pairing, rays: Rays, steps: int) -> None:
-    """Enter the curves of rays that `steps` steps lift; mark the rest for more effort."""
-    pairing.mark(rays, RayMark.LONG if steps == 1 else RayMark.HARD)
+def _step_over(pairing: Pairing, rays: Rays) -> None:
+    """Enter the curves of rays that one step lifts; mark those that need more effort.
+
+    Rays that end near one another wait until the first of them is lifted: often they meet its end.
+    """
+    rays = _without_difficult(pairing, rays)
+    for at in range(0, len(rays.points), CHUNK):
+        some = rays.take(slice(at, at + CHUNK))
+        ends = match_ends(pairing, some)
+        known = np.flatnonzero(ends.partners >= 0)
+        pairing.enter_many(some.take(known), ends.partners[known])
+        new = ends.first_of_alike(pairing)
+        pairing.mark(some.take(new | (ends.partners == TOO_LONG)), RayMark.LONG)
+        _lift_to_new_ends(pairing, some.take(new), ends.take(new))
+
+
+def _lift_to_new_ends(pairing: Pairing, rays: Rays, ends: Ends) -> None:
+    """Correct predicted ends, and enter the curves of those that can be trusted."""
+    store, line = pairing.points, pairing.line(rays)
+    tangent, index = ends.guesses - store.z[rays.points], store.index[rays.points]
+    constraints = pairing.setting.constraints
+    direct = correct_ends(line, ends.guesses, tangent, ends.lengths, index, constraints)
+    pairing.mark(rays.take(direct.hard), RayMark.HARD)
+    _enter_lifted(pairing, rays, direct)
+
+
+def _lift_long(pairing: Pairing, rays: Rays) -> None:
+    """Enter the curves of rays that a few equal steps lift; the rest count as hard."""
+    rays = _without_difficult(pairing, rays)
+    pairing.mark(rays, RayMark.HARD)
+    store = pairing.points
+    for at in range(0, len(rays.points), CHUNK):
+        some = rays.take(slice(at, at + CHUNK))
+        start = store.z[some.points], store.index[some.points]
+        direct = lift_directly(pairing.line(some), *start, pairing.setting.constraints)
+        _enter_lifted(pairing, some, direct)
+
+
+def _without_difficult(pairing: Pairing, rays: Rays) -> Rays:
+    """Rays on edges that need no more effort; the others are marked as hard."""
     difficult = pairing.effort[rays.edges] > 0
     pairing.mark(rays.take(difficult), RayMark.HARD)
-    rays = rays.take(~difficult)
-    for at in range(0, len(rays.points), CHUNK):
-        _lift_some(pairing, rays.take(slice(at, at + CHUNK)), steps)
+    return rays.take(~difficult)
 
 
-def _lift_some(pairing: Pairing, rays: Rays, steps: int) -> None:
+def _enter_lifted(pairing: Pairing, rays: Rays, direct: Direct) -> None:
+    """Enter the curves of rays that were lifted to points over their other ends."""
     store, setting, mesh = pairing.points, pairing.setting, pairing.mesh
-    start = store.z[rays.points], store.index[rays.points]
-    direct = lift_directly(pairing.line(rays), *start, setting.constraints, steps)
     done, z = rays.take(direct.good), direct.z[direct.good]
     vertices = mesh.edges[done.edges, 1 - done.sides]
     p = setting.parameters(mesh.vertices[vertices])

@@ -10,7 +10,7 @@ See docs/decisions.md, "Edges across narrow strips are recognised by the determi
 import numpy as np
 
 from equimorph.arrays import Flags, Items, Numbers, Values
-from equimorph.equilibria.determinants import determinants, hides_two_zeros
+from equimorph.equilibria.determinants import hides_two_zeros
 from equimorph.equilibria.steps import Bracket, Front, least_inside
 from equimorph.manifold.lifting.pairing import Pairing, RayMark, Rays
 from equimorph.marching.kernels import EARLY_DIP
@@ -40,35 +40,38 @@ def take_back_hiding(pairing: Pairing) -> None:
 
 def _new(pairing: Pairing) -> tuple[Numbers, BothEnds]:
     """Curves that were lifted at once and have not been looked at, as rays from both ends."""
-    known, pairing.looked_at = pairing.looked_at, len(pairing.curves.edge)
+    known, pairing.looked_at = pairing.looked_at, pairing.curves.count
     curves = np.arange(known, pairing.looked_at)
-    start, end, edges = (
-        np.array(each[known:], int)
-        for each in (pairing.curves.start, pairing.curves.end, pairing.curves.edge)
+    start, end, edges, plain = (
+        each[known:]
+        for each in (
+            pairing.curves.start,
+            pairing.curves.end,
+            pairing.curves.edge,
+            pairing.curves.plain,
+        )
     )
     sides = (pairing.mesh.edges[edges, 1] == pairing.points.vertex[start]).astype(int)
     alive = pairing.rays[start, pairing.slots[edges, sides]] == curves
-    alive &= (end >= 0) & (pairing.effort[edges] == 0)
-    plain = np.flatnonzero(alive & ~np.isin(curves, list(pairing.curves.inner)))
+    own = np.flatnonzero(alive & plain & (end >= 0) & (pairing.effort[edges] == 0))
     rays = Rays(start, edges, sides), Rays(end, edges, 1 - sides)
-    return curves[plain], (rays[0].take(plain), rays[1].take(plain))
+    return curves[own], (rays[0].take(own), rays[1].take(own))
 
 
 def _determinants(pairing: Pairing, points: Items) -> Values:
     """Determinants of F_z at points, nan for the number −1."""
-    numbers, place = np.unique(points, return_inverse=True)
-    at = np.maximum(numbers, 0)
-    values = determinants(pairing.setting.structure, pairing.points.z[at], pairing.points.p[at])
-    return np.asarray(np.where(numbers < 0, np.nan, values)[place])
+    pairing.slopes.fit(pairing.setting, pairing.points)
+    return np.where(points < 0, np.nan, pairing.slopes.determinant[points])
 
 
 def _are_steep(pairing: Pairing, rays: BothEnds) -> Flags:
     """Edges at an end of which the determinant changes much along some edge."""
-    points = np.concatenate([each.points for each in rays])
-    one, other = np.split(_determinants(pairing, points), 2)
+    one, other = (_determinants(pairing, each.points) for each in rays)
     much = np.abs(other - one) > STEEP * np.fmin(np.abs(one), np.abs(other))
-    steep = np.isin(points, points[np.tile(much, 2)])
-    return np.asarray(steep[: len(one)] | steep[len(one) :])
+    steep = np.zeros(pairing.points.count, bool)
+    for each in rays:
+        steep[each.points[much]] = True
+    return np.asarray(steep[rays[0].points] | steep[rays[1].points])
 
 
 def _dip(pairing: Pairing, rays: BothEnds) -> Flags:
@@ -93,23 +96,21 @@ def _slope(pairing: Pairing, rays: Rays, here: Values) -> Values:
     It lies on the same line of the grid and on the same sheet; nan where there is none.
     """
     mesh = pairing.mesh
-    spans = np.diff(mesh.vertices[mesh.edges], axis=1)[:, 0]
-    spans = spans / np.abs(spans).max(axis=0)
     vertex = mesh.edges[rays.edges, rays.sides]
     around = pairing.incident[vertex]
     outward = np.where(mesh.edges[around, 0] == vertex[:, None], 1.0, -1.0)
-    directions = outward[..., None] * spans[around]
-    own = np.where(rays.sides == 0, 1.0, -1.0)[:, None] * spans[rays.edges]
+    directions = outward[..., None] * mesh.spans(around)
+    own = np.where(rays.sides == 0, 1.0, -1.0)[:, None] * mesh.spans(rays.edges)
     lengths, length = np.linalg.norm(directions, axis=2), np.linalg.norm(own, axis=1)
     cosine = -(directions @ own[:, :, None])[..., 0] / (lengths * length[:, None])
     cosine[(around < 0) | ~mesh.edges_in_use[around]] = -1.0
     slot, every = cosine.argmax(axis=1), np.arange(len(cosine))
     behind = np.full(len(cosine), -1)
     curves = pairing.rays[rays.points, slot]
-    for lane in np.flatnonzero((cosine[every, slot] > STRAIGHT) & (curves >= 0)).tolist():
-        curve = int(curves[lane])
-        if curve not in pairing.curves.inner:
-            behind[lane] = pairing.other_end(curve, int(rays.points[lane]))
+    lanes = np.flatnonzero((cosine[every, slot] > STRAIGHT) & (curves >= 0))
+    lanes = lanes[pairing.curves.plain[curves[lanes]]]
+    start, end = pairing.curves.start[curves[lanes]], pairing.curves.end[curves[lanes]]
+    behind[lanes] = np.where(start == rays.points[lanes], end, start)
     return np.asarray((here - _determinants(pairing, behind)) * length / lengths[every, slot])
 
 

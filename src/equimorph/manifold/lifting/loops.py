@@ -5,19 +5,26 @@ there, so that the curves form closed loops, and open chains that end on a const
 Each loop, and a chain closed along the constraint, bounds a disc of the equilibrium set.
 """
 
-from collections.abc import Iterator
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
+from itertools import groupby
+from operator import attrgetter
 
 import numpy as np
 
-from equimorph.arrays import Bool, Int, Items, Some
+from equimorph.arrays import Bool, Int, ItemFlags, Items, Some, Triples
+from equimorph.linalg.lanes import results_of
 from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.geometry.tangents import frames_in_embedding, tangent_frames
+from equimorph.manifold.lifting.kernels import close_loops, find_plain_loops
 from equimorph.manifold.lifting.pairing import Pairing
 
 ALONG, ASIDE = 0.1, 0.3
 """Sines of angles between sheets and chords: along them at most, aside at least."""
+AT_ONCE = 8192
+"""Triangles around which loops are found together, while other threads do other ones."""
 NEARER = 0.5
 """Most that the gap in a chain may be, relative to the distance from another chain."""
 
@@ -37,12 +44,53 @@ class Polygon:
 
 
 @dataclass(frozen=True)
+class Polygons:
+    """Polygons as arrays, see `Polygon`: points of the k-th from ``starts[k]`` to its next."""
+
+    points: Int[np.ndarray, " all"]
+    starts: Int[np.ndarray, " n1"]
+    triangle: Items
+    open: ItemFlags
+    gap: Items
+
+    @classmethod
+    def of(cls, polygons: Sequence[Polygon]) -> "Polygons":
+        """Arrays of some polygons."""
+        lengths = [len(each.points) for each in polygons]
+        return cls(
+            np.array([point for each in polygons for point in each.points], int),
+            np.concatenate([[0], np.cumsum(np.array(lengths, int))]),
+            np.array([each.triangle for each in polygons], int),
+            np.array([each.open for each in polygons], bool),
+            np.array([each.gap for each in polygons], int),
+        )
+
+    def each(self, rows: Some) -> list[Polygon]:
+        """Some of the polygons as records."""
+        return [
+            Polygon(triangle, tuple(self.points[first:last].tolist()), is_open, gap)
+            for triangle, first, last, is_open, gap in zip(
+                self.triangle[rows].tolist(), self.starts[rows].tolist(),
+                self.starts[rows + 1].tolist(), self.open[rows].tolist(), self.gap[rows].tolist(),
+                strict=True,
+            )
+        ]  # fmt: skip
+
+    def of_length(self, length: int) -> tuple[Some, Int[np.ndarray, "some length"]]:
+        """Polygons with so many points, and these."""
+        rows = np.flatnonzero(np.diff(self.starts) == length)
+        return rows, self.points[self.starts[rows, None] + np.arange(length)]
+
+
+@dataclass(frozen=True)
 class Loops:
     """Plain triangles as an array, other polygons, and triangles that need subdivision."""
 
     plain: Int[np.ndarray, "P 3"]
     plain_triangle: Int[np.ndarray, " P"]
-    polygons: list[Polygon]
+    polygons: Polygons
+    special: list[Polygon]
+    """Polygons in triangles with arcs or several open chains."""
     ambiguous: list[int]
     """Triangles with several open chains: which ends belong together is not decided there."""
     broken: list[int]
@@ -52,27 +100,78 @@ class Loops:
 def find_loops(pairing: Pairing, wanted: Bool[np.ndarray, " T"] | None = None) -> Loops:
     """Close the curves around every triangle, or around the flagged ones."""
     triangles = np.arange(len(pairing.mesh.triangles))
-    plain, owner, special = _plain(pairing, triangles if wanted is None else triangles[wanted])
-    polygons: list[Polygon] = []
+    triangles = triangles if wanted is None else triangles[wanted]
+    plain, owner, left = _plain(pairing, triangles)
+    polygons, broken = _close(pairing, left, plain, owner)
+    chains = np.bincount(polygons.triangle[polygons.open], minlength=len(pairing.mesh.triangles))
+    several = chains > 1
+    several[_with_arc(pairing)] = True
+    rows = np.flatnonzero(several[polygons.triangle])
+    special, ambiguous, unjoined = _decide(pairing, polygons.each(rows))
+    alone = _alone(polygons, ~several[polygons.triangle])
+    return Loops(plain, owner, alone, special, ambiguous, [*broken.tolist(), *unjoined])
+
+
+def _close(
+    pairing: Pairing, triangles: Some, plain: Triples, owner: Items
+) -> tuple[Polygons, Int[np.ndarray, " broken"]]:
+    """Polygons over triangles that are not plain, and triangles over which they do not close."""
+    mesh, points, curves = pairing.mesh, pairing.points, pairing.curves
+    inner = np.zeros(curves.count + 1, int)
+    for curve, own in curves.inner.items():
+        inner[curve + 1] = len(own)
+    in_order = [point for curve in sorted(curves.inner) for point in curves.inner[curve]]
+    known = points.vertex, points.head, points.following, pairing.rays, pairing.slots
+    rows = np.stack([np.searchsorted(owner, triangles + k) for k in range(2)], axis=1)
+    flat, starts, triangle, is_open, broken = close_loops(
+        triangles, mesh.triangles, mesh.sides, mesh.edges, *known, curves.start, curves.end,
+        np.cumsum(inner), np.array(in_order, int), plain, rows,
+    )  # fmt: skip
+    nothing = np.zeros(len(triangle), int)
+    return Polygons(flat, starts, triangle, is_open > 0, nothing), triangles[broken]
+
+
+def _alone(polygons: Polygons, kept: ItemFlags) -> Polygons:
+    """Those of some polygons that are flagged."""
+    lengths = np.diff(polygons.starts)
+    return Polygons(
+        polygons.points[np.repeat(kept, lengths)],
+        np.concatenate([[0], np.cumsum(lengths[kept])]),
+        polygons.triangle[kept],
+        polygons.open[kept],
+        polygons.gap[kept],
+    )
+
+
+def _with_arc(pairing: Pairing) -> Some:
+    """Triangles with arcs over their sides."""
+    has = np.zeros(len(pairing.mesh.edges), bool)
+    has[[edge for edge, arcs in pairing.arcs.items() if arcs]] = True
+    return np.flatnonzero(has[pairing.mesh.sides].any(axis=1))
+
+
+def _decide(
+    pairing: Pairing, polygons: list[Polygon]
+) -> tuple[list[Polygon], list[int], list[int]]:
+    """Polygons in triangles with arcs or several chains; triangles without a decision; broken."""
+    decided: list[Polygon] = []
     ambiguous: list[int] = []
     broken: list[int] = []
-    ends = np.searchsorted(owner, np.stack([special, special + 1]))
-    for triangle, start, stop in zip(special.tolist(), *ends.tolist(), strict=True):
-        found = list(_around(pairing, triangle, set(plain[start:stop].ravel().tolist())))
-        found, joined = _with_arcs(pairing, triangle, found)
+    for triangle, own in groupby(polygons, key=attrgetter("triangle")):
+        found, joined = _with_arcs(pairing, triangle, list(own))
         chains = [polygon for polygon in found if polygon is not None and polygon.open]
         if any(polygon is None for polygon in found):
             broken.append(triangle)
         elif len(chains) > 1 and not _closes_alone(pairing, chains):
             ambiguous.append(triangle)
         else:
-            polygons.extend(polygon for polygon in found if polygon is not None)
-            polygons.extend(joined)
-    return Loops(plain, owner, polygons, ambiguous, broken)
+            decided.extend(polygon for polygon in found if polygon is not None)
+            decided.extend(joined)
+    return decided, ambiguous, broken
 
 
 def _with_arcs(
-    pairing: Pairing, triangle: int, found: list[Polygon | None]
+    pairing: Pairing, triangle: int, found: list[Polygon]
 ) -> tuple[list[Polygon | None], list[Polygon]]:
     """Polygons over a triangle that no arc belongs to, and those with arcs.
 
@@ -81,9 +180,9 @@ def _with_arcs(
     """
     sides = pairing.mesh.sides[triangle].tolist()
     arcs = [Polygon(triangle, arc, True) for edge in sides for arc in pairing.arcs.get(edge, ())]
-    polygons, joined = [polygon for polygon in found if polygon is not None], []
-    if not arcs or len(polygons) < len(found):
-        return found, []
+    polygons, joined = list(found), []
+    if not arcs:
+        return [*found], []
     while arcs:
         arc = arcs.pop()
         met = _crossings(pairing, arc)
@@ -171,120 +270,13 @@ def _plain(
     pairing: Pairing, triangles: Some
 ) -> tuple[Int[np.ndarray, "P 3"], Int[np.ndarray, " P"], Int[np.ndarray, " S"]]:
     """Loops of three curves that go straight across; triangles over which other loops exist."""
-    mesh, points = pairing.mesh, pairing.points
-    partner = _partners(pairing)
-    vertex = points.vertex[: points.count]
-    order = np.argsort(vertex, kind="stable")
-    order = order[vertex[order] >= 0]
-    amount = np.bincount(vertex[order], minlength=len(mesh.vertices))
-    first = np.concatenate([[0], np.cumsum(amount)])
-    here = amount[mesh.triangles[triangles, 0]]
-    owner = np.repeat(triangles, here)
-    offset = np.arange(len(owner)) - np.repeat(np.cumsum(here) - here, here)
-    a = order[first[mesh.triangles[owner, 0]] + offset]
-    b = _across(pairing, partner, a, mesh.sides[owner, 0])
-    c = _across(pairing, partner, a, mesh.sides[owner, 2])
-    closed = (b >= 0) & (c >= 0)
-    closed[closed] = _across(pairing, partner, b[closed], mesh.sides[owner[closed], 1]) == c[closed]
-    loops = np.bincount(owner[closed], minlength=len(mesh.triangles))
-    special = (amount[mesh.triangles[triangles]] > loops[triangles, None]).any(axis=1)
-    return np.stack([a, b, c], axis=1)[closed], owner[closed], triangles[special]
-
-
-def _partners(pairing: Pairing) -> Int[np.ndarray, "count slots"]:
-    """Point at the other end of each point's curves that go straight across; −1 elsewhere."""
-    points, curves = pairing.points, pairing.curves
-    if not curves.edge:
-        return np.full((points.count, pairing.rays.shape[1]), -1)
-    start, end = np.array(curves.start, int), np.array(curves.end, int)
-    simple = end >= 0
-    simple[list(curves.inner)] = False
-    simple &= points.vertex[start] != points.vertex[end]
-    curve = pairing.rays[: points.count]
-    own = np.arange(points.count)[:, None]
-    other = np.where(start[curve] == own, end[curve], start[curve])
-    return np.where((curve >= 0) & simple[curve], other, -1)
-
-
-def _across(
-    pairing: Pairing, partner: Int[np.ndarray, "count slots"], point: Items, edge: Items
-) -> Items:
-    side = (pairing.mesh.edges[edge, 1] == pairing.points.vertex[point]).astype(int)
-    return np.asarray(partner[point, pairing.slots[edge, side]])
-
-
-def _around(pairing: Pairing, triangle: int, plain: set[int]) -> Iterator[Polygon | None]:
-    """Polygons over one triangle that are not plain; None where curves are missing or go twice."""
-    points, at = pairing.points, edges_at(pairing, triangle)
-    corners = pairing.mesh.triangles[triangle].tolist()
-    todo = {point for corner in corners for point in points.over(corner)} - plain
-    ends = [
-        (point, edge)
-        for point in sorted(todo)
-        for edge in at[int(points.vertex[point])]
-        if pairing.ray(point, edge) >= 0 and pairing.curves.end[pairing.ray(point, edge)] < 0
+    mesh, points, curves = pairing.mesh, pairing.points, pairing.curves
+    known = points.vertex, points.head, points.following, pairing.rays, pairing.slots
+    lines = curves.start, curves.end, curves.plain
+    parts = [triangles[at : at + AT_ONCE] for at in range(0, max(len(triangles), 1), AT_ONCE)]
+    tasks = [
+        partial(find_plain_loops, own, mesh.triangles, mesh.sides, mesh.edges, *known, *lines)
+        for own in parts
     ]
-    for point, edge in ends:
-        if point in todo:
-            yield _walk(pairing, triangle, point, edge, todo)
-    while todo:
-        point = min(todo)
-        yield _walk(pairing, triangle, point, None, todo)
-
-
-def _walk(
-    pairing: Pairing, triangle: int, point: int, came_by: int | None, todo: set[int]
-) -> Polygon | None:
-    """Follow curves from a point; from an exit if `came_by` names the edge that leads to it."""
-    points, curves, at = pairing.points, pairing.curves, edges_at(pairing, triangle)
-    path: list[int] = []
-    if came_by is not None:
-        path.extend(reversed(curves.inner[pairing.ray(point, came_by)]))
-    first, visited = point, []
-    here = at[int(points.vertex[point])]
-    edge = here[0] if came_by is None else _other(here, came_by)
-    while True:
-        path.append(point)
-        visited.append(point)
-        todo.discard(point)
-        curve = pairing.ray(point, edge)
-        if curve < 0 or len(visited) > 64:
-            return None
-        inner = curves.inner.get(curve, [])
-        forward = curves.start[curve] == point
-        path.extend(inner if forward else reversed(inner))
-        following = curves.end[curve] if forward else curves.start[curve]
-        if following < 0:
-            return Polygon(triangle, tuple(path), True) if came_by is not None else None
-        if following == first and came_by is None:
-            break
-        if following in visited:
-            return None
-        point = following
-        edge = _other(at[int(points.vertex[point])], edge)
-    return None if _twice(pairing, triangle, visited) else Polygon(triangle, tuple(path), False)
-
-
-def edges_at(pairing: Pairing, triangle: int) -> dict[int, tuple[int, int]]:
-    """Return the two sides of a triangle that meet at each of its corners."""
-    mesh = pairing.mesh
-    corners, sides = mesh.triangles[triangle].tolist(), mesh.sides[triangle].tolist()
-    return {corners[k]: (sides[k], sides[(k + 2) % 3]) for k in range(3)}
-
-
-def _twice(pairing: Pairing, triangle: int, visited: list[int]) -> bool:
-    """Whether a loop without folds or exits passes over a corner more than once."""
-    vertices = [int(pairing.points.vertex[point]) for point in visited]
-    if len(set(vertices)) == len(vertices):
-        return False
-    at = edges_at(pairing, triangle)
-    curves = (
-        pairing.ray(point, edge)
-        for point, vertex in zip(visited, vertices, strict=True)
-        for edge in at[vertex]
-    )
-    return not any(pairing.curves.inner.get(curve) for curve in curves)
-
-
-def _other(pair: tuple[int, int], edge: int) -> int:
-    return pair[1] if pair[0] == edge else pair[0]
+    loops, owner, special = zip(*results_of(tasks), strict=True)
+    return np.concatenate(loops), np.concatenate(owner), triangles[np.concatenate(special)]

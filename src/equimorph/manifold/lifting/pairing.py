@@ -5,12 +5,13 @@ from enum import IntEnum
 
 import numpy as np
 
-from equimorph.arrays import Float, Int, Items
+from equimorph.arrays import Float, Int, ItemFlags, Items
 from equimorph.columns import Columns
 from equimorph.equilibria import ParameterLine
 from equimorph.manifold.complex.base_mesh import BaseMesh
 from equimorph.manifold.geometry.points import Points, VertexKind
 from equimorph.manifold.geometry.setting import Setting
+from equimorph.manifold.lifting.slopes import Slopes
 from equimorph.tolerances import SAME_STATE
 
 
@@ -26,30 +27,57 @@ class RayMark(IntEnum):
     """A few steps cannot, either."""
 
 
-@dataclass
 class Curves:
     """Lifted edges: edge, start point, end point (−1: left through a constraint), inner points."""
 
-    edge: list[int] = field(default_factory=list)
-    start: list[int] = field(default_factory=list)
-    end: list[int] = field(default_factory=list)
-    inner: dict[int, list[int]] = field(default_factory=dict)
+    def __init__(self) -> None:
+        self.count, self._columns = 0, np.zeros((4, 0), int)
+        self.inner: dict[int, list[int]] = {}
+
+    @property
+    def edge(self) -> Items:
+        """Edge of each curve."""
+        return self._columns[0, : self.count]
+
+    @property
+    def start(self) -> Items:
+        """Point at which each curve starts."""
+        return self._columns[1, : self.count]
+
+    @property
+    def end(self) -> Items:
+        """Point at which each curve ends; −1 where it left through a constraint."""
+        return self._columns[2, : self.count]
+
+    @property
+    def plain(self) -> ItemFlags:
+        """Which curves have no inner points."""
+        return np.asarray(self._columns[3, : self.count] == 0)
 
     def add(self, edge: int, start: int, end: int, inner: list[int]) -> int:
         """Add a curve; return its number."""
-        self.edge.append(edge)
-        self.start.append(start)
-        self.end.append(end)
-        if inner:
-            self.inner[len(self.edge) - 1] = inner
-        return len(self.edge) - 1
+        number = int(self.extend(*np.array([[edge], [start], [end]]))[0])
+        self.put_inside(number, inner)
+        return number
 
     def extend(self, edges: Items, starts: Items, ends: Items) -> Items:
         """Add curves without inner points; return their numbers."""
-        numbers = len(self.edge) + np.arange(len(edges))
-        self.edge.extend(edges.tolist())
-        self.start.extend(starts.tolist())
-        self.end.extend(ends.tolist())
+        return self._append(np.stack([edges, starts, ends, np.zeros_like(edges)]))
+
+    def put_inside(self, curve: int, inner: list[int]) -> None:
+        """Enter the inner points of a curve, if it has any."""
+        if inner:
+            self.inner[curve] = inner
+            self._columns[3, curve] = len(inner)
+
+    def _append(self, columns: Int[np.ndarray, "4 n"]) -> Items:
+        numbers = self.count + np.arange(columns.shape[1])
+        self.count += len(numbers)
+        if self.count > self._columns.shape[1]:
+            grown = np.empty((4, max(2 * self._columns.shape[1], self.count, 64)), int)
+            grown[:, : self._columns.shape[1]] = self._columns
+            self._columns = grown
+        self._columns[:, numbers] = columns
         return numbers
 
 
@@ -79,6 +107,7 @@ class Pairing:
     effort: Int[np.ndarray, " E"]
     limit: int
     """Most points; see `is_full`."""
+    slopes: Slopes
     conflicts: int = 0
     crossings: dict[int, list[int]] = field(default_factory=dict)
     """Points of each edge at which two curves cross."""
@@ -131,7 +160,7 @@ class Pairing:
 
     def alive(self, curve: int) -> bool:
         """Whether a curve has not been taken back."""
-        return self.ray(self.curves.start[curve], self.curves.edge[curve]) == curve
+        return self.ray(int(self.curves.start[curve]), int(self.curves.edge[curve])) == curve
 
     def rays_with(self, mark: RayMark) -> Rays:
         """Rays with a certain mark: each edge from one end, so that no curve is traced twice."""
@@ -184,7 +213,7 @@ class Pairing:
 
     def other_end(self, curve: int, point: int) -> int:
         """Point at the other end of a curve."""
-        start, end = self.curves.start[curve], self.curves.end[curve]
+        start, end = int(self.curves.start[curve]), int(self.curves.end[curve])
         return end if start == point else start
 
     def fit(self) -> None:
@@ -213,8 +242,8 @@ class Pairing:
 
     def forget(self, curve: int, mark: RayMark = RayMark.UNTRACED) -> None:
         """Take a curve back from its ends."""
-        edge = self.curves.edge[curve]
-        for point in (self.curves.start[curve], self.curves.end[curve]):
+        edge = int(self.curves.edge[curve])
+        for point in (int(self.curves.start[curve]), int(self.curves.end[curve])):
             if point >= 0 and self.ray(point, edge) == curve:
                 self.set_ray(point, edge, mark)
 
@@ -248,6 +277,7 @@ def start_pairing(setting: Setting, mesh: BaseMesh, limit: int) -> Pairing:
         incident,
         np.zeros(len(mesh.edges), int),
         limit,
+        Slopes.empty(setting),
     )
     pairing.fit()
     return pairing

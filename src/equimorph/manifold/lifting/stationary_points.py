@@ -15,13 +15,14 @@ import numpy as np
 from equimorph.arrays import Flags, Float, Int, Lanes, Parameters, Places, Some, Values
 from equimorph.columns import Columns
 from equimorph.equilibria.critical import null_border
-from equimorph.equilibria.settle import free_directions
+from equimorph.linalg.lanes import over_lanes
 from equimorph.manifold.geometry.crossings import Reduction, reduction
 from equimorph.manifold.geometry.points import Points
 from equimorph.manifold.geometry.quadratics import least_in_simplex, monomials
 from equimorph.manifold.geometry.setting import Setting
 from equimorph.manifold.geometry.topology import keys_of
 from equimorph.manifold.lifting.cells import Cells
+from equimorph.manifold.lifting.kernels import slope_squares, square_gaps
 from equimorph.manifold.lifting.pairing import Pairing
 from equimorph.tolerances import SAME_STATE
 
@@ -222,9 +223,9 @@ class _Corners:
         """Number the pairs of points."""
         keys, place = np.unique(pairs.one * points.count + pairs.other, return_inverse=True)
         one, other = np.divmod(keys, points.count)
-        mass = points.structure.mass
-        gap = points.z[one, : len(mass)] - points.z[other, : len(mass)]
-        return cls(one, other, gap**2 @ mass, place.reshape(pairs.one.shape))
+        squared = np.empty(len(keys))
+        over_lanes(square_gaps, (points.structure.mass, points.z), (one, other), (squared,))
+        return cls(one, other, squared, place.reshape(pairs.one.shape))
 
     def varying(self, pairs: _Pairs) -> tuple[_Pairs, "_Corners"]:
         """Pairs of sheets whose distance varies enough around their cells to vanish inside."""
@@ -240,7 +241,7 @@ class _Corners:
 def _models(pairing: Pairing, pairs: _Pairs, over: _Corners) -> tuple[Values, Shares]:
     """Least value of the model of D in each cell over that at the corners, and where it is."""
     mesh, d = pairing.mesh, pairing.mesh.dimension
-    slope = _slopes(pairing.setting, pairing.points, over)
+    slope = _slopes(pairing, over)
     corners = mesh.vertices[mesh.cells[pairs.cell]]
     along = np.einsum("ncd,nkd->nck", slope[over.place], corners[:, 1:] - corners[:, :1])
     squared = over.squared[over.place]
@@ -249,17 +250,18 @@ def _models(pairing: Pairing, pairs: _Pairs, over: _Corners) -> tuple[Values, Sh
     return least / np.maximum(squared.min(axis=1), 1e-300), shares
 
 
-def _slopes(setting: Setting, points: Points, over: _Corners) -> Places:
+def _slopes(pairing: Pairing, over: _Corners) -> Places:
     """Derivatives of the squared distances with respect to the free parameters."""
-    structure, n = setting.structure, setting.structure.unknowns
-    used, place = np.unique(np.concatenate([over.one, over.other]), return_inverse=True)
-    one, other = np.split(place, 2)
-    directions = free_directions(structure, setting.free, len(used))
-    system = structure.linear_system(points.z[used], points.p[used], directions)
-    tangents = system.solve(-system.columns, None).x[:, :, :n]
-    gap = (points.z[over.one, :n] - points.z[over.other, :n]) * structure.mass
-    moved = np.einsum("li,lki->lk", gap, tangents[one] - tangents[other])
-    return np.asarray(2.0 * moved / setting.scales)
+    setting, points, slopes = pairing.setting, pairing.points, pairing.slopes
+    slopes.fit(setting, points)
+    out = np.empty((len(over.one), len(setting.free)))
+    over_lanes(
+        slope_squares,
+        (setting.structure.mass, points.z, slopes.tangents),
+        (over.one, over.other),
+        (out,),
+    )
+    return out
 
 
 def _pairs(pairing: Pairing, cells: Cells, wanted: Some) -> _Pairs:

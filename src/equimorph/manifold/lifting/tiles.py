@@ -14,7 +14,7 @@ from equimorph.arrays import Bool, EdgeFlags, Float, Int, Items
 from equimorph.manifold.complex.base_mesh import BaseMesh
 from equimorph.manifold.geometry.points import Points
 from equimorph.manifold.lifting.grid import Lines
-from equimorph.manifold.lifting.pairing import Curves, Pairing, RayMark, start_pairing
+from equimorph.manifold.lifting.pairing import Pairing, RayMark, start_pairing
 
 Cuts = tuple[Float[np.ndarray, " _"], ...]
 """Places of the cuts along each free parameter."""
@@ -100,7 +100,7 @@ def parts_of(whole: Pairing, tiles: list[Tile]) -> list[Part]:
     """What is known of some tiles."""
     whole.fit()
     live = _live(whole)
-    edge = np.array(whole.curves.edge, int)[live]
+    edge = whole.curves.edge[live]
     parts = []
     for tile in tiles:
         own = live[_flags(tile.edges, edge)]
@@ -110,9 +110,7 @@ def parts_of(whole: Pairing, tiles: list[Tile]) -> list[Part]:
 
 def _live(whole: Pairing) -> Items:
     """Curves that have not been taken back."""
-    start, edge = np.array(whole.curves.start, int), np.array(whole.curves.edge, int)
-    if len(edge) == 0:
-        return edge
+    start, edge = whole.curves.start, whole.curves.edge
     side = (whole.mesh.edges[edge, 1] == whole.points.vertex[start]).astype(int)
     return np.flatnonzero(whole.rays[start, whole.slots[edge, side]] == np.arange(len(edge)))
 
@@ -145,12 +143,11 @@ def cut_out(whole: Pairing, part: Part) -> Pairing:
     number[at] = np.arange(len(at))
     curves = whole.curves
     # the last number stands for ends on a constraint
-    start, end = (number[np.array(each, int)[part.curves]] for each in (curves.start, curves.end))
-    edge = np.searchsorted(tile.edges, np.array(curves.edge, int)[part.curves])
-    out.curves = Curves(edge.tolist(), start.tolist(), end.tolist())
-    inner = np.isin(part.curves, list(curves.inner))
-    for k in np.flatnonzero(inner).tolist():
-        out.curves.inner[k] = number[curves.inner[int(part.curves[k])]].tolist()
+    start, end = (number[each[part.curves]] for each in (curves.start, curves.end))
+    edge = np.searchsorted(tile.edges, curves.edge[part.curves])
+    out.curves.extend(edge, start, end)
+    for k in np.flatnonzero(~curves.plain[part.curves]).tolist():
+        out.curves.put_inside(k, number[curves.inner[int(part.curves[k])]].tolist())
     out.looked_at = len(edge)
     out.effort = whole.effort[tile.edges]
     _copy_rays(whole, part, out)
@@ -185,7 +182,7 @@ def _copy_rays(whole: Pairing, part: Part, out: Pairing) -> None:
     edges = tile.edges[own]
     side = (whole.mesh.edges[edges, 1] == tile.vertices[vertex][:, None]).astype(int)
     known = whole.rays[part.points[over][:, None], whole.slots[edges, side]]
-    curve = np.full(len(whole.curves.edge) + 1, RayMark.UNTRACED)
+    curve = np.full(whole.curves.count + 1, RayMark.UNTRACED)
     curve[part.curves] = np.arange(len(part.curves))
     rays[over] = np.where(own < 0, RayMark.UNTRACED, np.where(known < 0, known, curve[known]))
     out.rays = rays
