@@ -128,6 +128,11 @@ def _enter_lifted(pairing: Pairing, rays: Rays, direct: Direct) -> None:
     vertices = mesh.edges[done.edges, 1 - done.sides]
     p = setting.parameters(mesh.vertices[vertices])
     # where it is lifted in one sweep, the index stays what it was
-    ids, _ = store.over_vertices(vertices, z, p, store.index[done.points])
+    ids, new = store.over_vertices(vertices, z, p, store.index[done.points])
     pairing.fit()
-    pairing.enter_many(done, ids)
+    # it was counted a correction before the last one; where eigenvalues nearly vanish it may differ
+    pairing.slopes.fit(setting, store)
+    counted = pairing.slopes.index[ids]
+    same = np.flatnonzero(counted == store.index[done.points])
+    store.index[ids[new]] = counted[new]
+    pairing.enter_many(done.take(same), ids[same])
