@@ -228,6 +228,19 @@ def test_twins_of_solutions_beside_a_singular_map_are_found(arch_set):
         assert len(answer.stable) == 2
 
 
+@pytest.mark.parametrize(
+    ("place", "other"),
+    [((0.72017, -0.19016), 2 / 3), ((0.61459, -0.16419), 1 / 2), ((0.6989, -0.1362), 1 / 2)],
+)
+def test_states_of_a_coarse_set_are_solutions_of_their_own_values(place, other):
+    """Height and Δ of stable states beside det J_S = 0: 24 of 17 800 such states were missing."""
+    eset = sets.arch_set((9, 14))
+    height, delta = eset.structure.height(other), em.value_of(eset.structure, "Delta")
+    for state in eset.at(Theta=place[0], Delta=place[1]).stable:
+        found = em.solve_shape(eset, {height: height(state), delta: place[1]})
+        assert np.abs(found.states.p - state.p).max(axis=1).min() < 1e-7
+
+
 def test_more_targets_than_actuators_are_fitted(arch_set):
     """Targets of a state are met exactly; others leave a misfit that no state nearby beats."""
     arch = arch_set.structure

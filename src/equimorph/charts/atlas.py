@@ -54,7 +54,7 @@ class Leaf(Chart):
         """The chart's cells."""
         return Cells(self.eset, self.coordinates, self.numbers)
 
-    def _find_states(self, points: Points) -> Found:
+    def find(self, points: Points) -> Found:
         """States on the chart's cells: what lies beyond a cut belongs to another chart."""
         found = self.family.find(points)
         return found.take(np.isin(found.cell, self.numbers))

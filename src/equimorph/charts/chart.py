@@ -22,6 +22,7 @@ from equimorph.charts.domain import (
 from equimorph.charts.location import Cells, EdgeKind, Found
 from equimorph.charts.preparation import cut_along_crossings, flip_inverted_triangles
 from equimorph.charts.singular_pairs import SingularPairs
+from equimorph.charts.twins import add_twins
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet, Level, singular_set
 from equimorph.manifold.geometry.setting import embed
@@ -155,7 +156,7 @@ class Chart(ABC):
             If a point has another number of coordinates, or a value is not finite.
         """
         points = self._check_width(coords)
-        found = self._find_states(points)
+        found = self.find(points)
         count = np.bincount(found.point, minlength=len(points))
         code = np.full(len(points), PointStatus.GAP)
         code[count == 1] = PointStatus.INSIDE
@@ -202,7 +203,7 @@ class Chart(ABC):
         gap[own] = np.linalg.norm(found - theirs, axis=1)
         return np.asarray(gap <= 10.0 * SAME_STATE)
 
-    def _find_states(self, points: Points) -> Found:
+    def find(self, points: Points) -> Found:
         """All states of the chart's cells over points."""
         return self.cells.find(points)
 
@@ -338,10 +339,15 @@ class DescriptorChart(Chart):
         states = self.singular.states
         return SingularPairs(self.cells, states) if len(states) else None
 
-    def _find_states(self, points: Points) -> Found:
-        """All states of the chart's cells over points, and of pairs that lie beside these cells."""
-        found = super()._find_states(points)
-        return found if self._pairs is None else self._pairs.add_to(found, points)
+    def find(self, points: Points) -> Found:
+        """All states of the chart's cells over points, and of pairs that lie beside these cells.
+
+        A second state is found from the curve on which the coordinates fold, or from the first one.
+        """
+        found = super().find(points)
+        if self._pairs is not None:
+            found = self._pairs.add_to(found, points)
+        return add_twins(self.cells, found, points)
 
     @cached_property
     def single_valued(self) -> bool:

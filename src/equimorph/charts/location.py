@@ -5,6 +5,7 @@ from enum import StrEnum
 from functools import cached_property
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from equimorph.arrays import (
     Bool,
@@ -16,6 +17,7 @@ from equimorph.arrays import (
     Lanes,
     Numbers,
     Parameters,
+    Place,
     Points,
     Some,
     VertexFlags,
@@ -45,8 +47,9 @@ from equimorph.tolerances import SAME_STATE
 
 Guess = tuple[Float[np.ndarray, "hits size"], Float[np.ndarray, "hits parameters"]]
 
-OVERHANG = 0.3
-"""How far beyond a cell at an edge, in barycentric coordinates, a point may lie to be tried."""
+OVERHANG, WIDE = 0.3, 1.0
+"""How far beyond a cell at an edge, in barycentric coordinates, a point may lie to be tried: by
+parameters, and by descriptors, whose values over a cell bend more."""
 CHUNK = 4096
 """Points whose states are found at once."""
 SLACK = 1e-9
@@ -147,7 +150,8 @@ class Cells:
 
     @cached_property
     def _index(self) -> CellIndex:
-        overhang = np.where(self._edge, OVERHANG, 0.0)
+        farthest = OVERHANG if self.coordinates.projecting else WIDE
+        overhang = np.where(self._edge, farthest, 0.0)
         return CellIndex.of(self.values[self.corners], overhang)
 
     @cached_property
@@ -279,6 +283,21 @@ class Cells:
     def sizes(self) -> Float[np.ndarray, " own"]:
         """Longest sides from the first corners of the cells, in the metric."""
         return np.asarray(np.linalg.norm(self._frames, axis=2).max(axis=1))
+
+    @cached_property
+    def ranges(self) -> Place:
+        """Ranges of the coordinates over the set."""
+        return np.asarray(np.maximum(np.ptp(self.values, axis=0), 1e-300))
+
+    @cached_property
+    def _middles(self) -> cKDTree:
+        setting, points = self.coordinates.setting, self.eset.points
+        return cKDTree(embed(setting, points.z, points.p)[self.corners].mean(axis=1))
+
+    def nearest(self, states: States) -> Items:
+        """Places, among these, of the cells whose middles are nearest to states."""
+        place = embed(self.coordinates.setting, states.z, states.p)
+        return np.asarray(self._middles.query(place)[1])
 
     def planes(self, cell: Int[np.ndarray, " hits"]) -> Float[np.ndarray, "hits d coordinates"]:
         """Orthonormal bases of the planes of cells."""

@@ -67,29 +67,20 @@ class SingularPairs:
         """The coordinates that fold."""
         return self.cells.coordinates
 
-    @cached_property
+    @property
     def _ranges(self) -> Place:
-        return np.asarray(np.maximum(np.ptp(self.cells.values, axis=0), 1e-300))
+        return self.cells.ranges
 
     @cached_property
     def _frames(self) -> Frames:
         """Tangent spaces at the singular states, from the planes of the nearest cells."""
         setting = self.coordinates.setting
-        cell = self._nearest_cells(self.states)
+        cell = self.cells.nearest(self.states)
         return tangent_frames(setting, self.states.z, self.states.p, self.cells.planes(cell))
 
     @cached_property
     def _tree(self) -> cKDTree:
         return cKDTree(self.coordinates(self.states.z, self.states.p) / self._ranges)
-
-    @cached_property
-    def _middles(self) -> cKDTree:
-        return cKDTree(places_of(self.cells.eset)[self.cells.corners].mean(axis=1))
-
-    def _nearest_cells(self, states: States) -> Numbers:
-        """Places, among the cells, of those whose middles are nearest."""
-        place = embed(self.coordinates.setting, states.z, states.p)
-        return np.asarray(self._middles.query(place)[1])
 
     @cached_property
     def _bend(self) -> _Bend:
@@ -130,12 +121,12 @@ class SingularPairs:
         good = own.found & (np.linalg.norm(moved, axis=1) <= 2.0 * self._longest)
         some = np.flatnonzero(good)
         states, point = States(structure, own.z[some], own.p[some]), point[some]
-        cell = self._nearest_cells(states)
+        cell = self.cells.nearest(states)
         good = self.cells.hold(states, own.index[some], cell)
         new = Found(
             states[good], point[good], self.cells.numbers[cell[good]], np.zeros(good.sum(), bool)
         )
-        return _unite(self.cells, found, new)
+        return unite(self.cells, found, new)
 
     @property
     def _longest(self) -> float:
@@ -164,7 +155,7 @@ class SingularPairs:
         return np.tile(point[good], 2), np.tile(near[good], 2), both
 
 
-def _unite(cells: Cells, first: Found, second: Found) -> Found:
+def unite(cells: Cells, first: Found, second: Found) -> Found:
     """States of both, equal ones once, sorted by point."""
     states = join_states(first.states.structure, [first.states, second.states])
     point, cell, inside = (

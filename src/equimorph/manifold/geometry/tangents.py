@@ -32,6 +32,8 @@ from equimorph.tolerances import METRIC_DIFFERENCE
 
 CHUNK = 2048
 """Points whose tangent spaces are computed together: this bounds the memory."""
+BEYOND = 1e9
+"""Largest excess over a constraint that differences are taken of."""
 S_SHAPE = 0.1
 """Farthest a cubic whose slopes at both ends are the same leaves its chord: √3/18, in slopes."""
 
@@ -86,7 +88,8 @@ def cap_slopes(
 
     def worst(sign: float, k: int) -> Values:
         dz, dp = split_step(setting, sign * METRIC_DIFFERENCE * frames[:, k])
-        return worst_excess(setting.constraints, z + dz, p + dp)
+        # beyond a barrier of a reduction the excess is infinite
+        return np.clip(worst_excess(setting.constraints, z + dz, p + dp), -BEYOND, BEYOND)
 
     slopes = [worst(1.0, k) - worst(-1.0, k) for k in range(frames.shape[1])]
     return np.stack(slopes, axis=1) / (2.0 * METRIC_DIFFERENCE)

@@ -7,13 +7,14 @@ from itertools import pairwise
 import numpy as np
 from scipy.spatial import cKDTree
 
-from equimorph.arrays import Bool, Edges, Float, Int, Items, Rows, Some
+from equimorph.arrays import Bool, Edges, Float, Int, Items
+from equimorph.charts import DescriptorChart
 from equimorph.equilibria.point_conditions import Values
 from equimorph.equilibria.settle import Guards, Settled, embedded_planes, free_directions, settle
+from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet, Level, level_set
 from equimorph.manifold.complex.kept_tables import from_cache, places_of
 from equimorph.manifold.geometry.setting import Setting, embed
-from equimorph.manifold.geometry.tangents import split_step
 from equimorph.manifold.geometry.topology import faces_of, pieces
 from equimorph.manifold.lookup.cell_index import CellIndex, Hits
 from equimorph.manifold.queries.nearest import SetPoints, local_minima, points_at_vertices
@@ -30,11 +31,6 @@ CLOSE = 0.5
 """Distance of two predictions, in sizes of their cell, below which one of them will do."""
 OVERHANG = 0.5
 """How far beyond a cell, in barycentric coordinates, its linear prediction is still tried."""
-
-TWIN_STEP = 0.02
-"""Step along the set, in the metric, by which the bending of the descriptors is measured."""
-FARTHEST_TWIN = 0.5
-"""Distance along the set, in the metric, within which a second solution is looked for."""
 
 GUARDS = Guards(iterations=30, longest=0.3, converged=1e-7)
 """The last correction is 1e-7, so that Newton's method leaves an error at round-off."""
@@ -156,6 +152,14 @@ class Predictor:
         sides /= np.maximum(np.linalg.norm(sides, axis=2, keepdims=True), 1e-300)
         return np.ascontiguousarray(np.swapaxes(np.linalg.qr(np.swapaxes(sides, 1, 2))[0], 1, 2))
 
+    @cached_property
+    def chart(self) -> DescriptorChart | None:
+        """Chart by as many descriptors as free parameters; None if they depend on each other."""
+        try:
+            return DescriptorChart(self.eset, self.descriptors)
+        except InputError:
+            return None
+
     def misfits(self, targets: Float[np.ndarray, " k"]) -> Float[np.ndarray, " V"]:
         """Root of the sum of squares of what vertices miss, in ranges over the set."""
         return np.asarray(np.sqrt((((self.values - targets) / self.spread) ** 2).sum(axis=1)))
@@ -186,57 +190,6 @@ def states_with_values(
     values = Values(tuple(each.function for each in descriptors), targets)
     frame = embedded_planes(structure, free, at.rows)
     return settle(structure, at.z, at.p, directions, [values], GUARDS, frame)
-
-
-def twin_guesses(
-    known: Predictor, exact: Settled, rows: Rows, some: Some
-) -> tuple[SetPoints, Int[np.ndarray, " twins"]]:
-    """Guesses of second solutions close to given ones near det J_S = 0.
-
-    Along the direction v in which the descriptors change least, their component u follows
-    ``σ t + c t²/2``, which vanishes again at ``t = −2σ/c``. The curvature c comes from states of
-    the set on both sides along v.
-
-    Parameters
-    ----------
-    exact
-        Solutions of as many values as free parameters.
-    rows
-        Bases of spaces near the tangent spaces at each.
-    some
-        Numbers of the solutions.
-
-    Returns
-    -------
-    The guesses, and for each the number of its solution.
-    """
-    if len(some) == 0:
-        return SetPoints(exact.z[some], exact.p[some], rows[some]), some
-    left, sizes, right = np.linalg.svd(exact.slopes[some] / known.spread[:, None])
-    steps = np.einsum("lk,lkf->lf", right[:, -1], exact.frames[some])
-    dz, dp = split_step(known.setting, steps)
-    z, p, planes = exact.z[some], exact.p[some], rows[some]
-    sides = [SetPoints(z + t * dz, p + t * dp, planes) for t in (-TWIN_STEP, TWIN_STEP)]
-    there = _onto_set(known.setting, SetPoints.concatenate(sides))
-    there_and_here = np.concatenate([there.z, z]), np.concatenate([there.p, p])
-    own = [each.function(*there_and_here) for each in known.descriptors]
-    behind, ahead, here = np.split(np.stack(own, axis=1) / known.spread, 3)
-    second = (behind - 2.0 * here + ahead) / TWIN_STEP**2
-    bend = np.einsum("lm,lm->l", left[:, :, -1], second)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        t = -2.0 * sizes[:, -1] / bend
-    near = np.flatnonzero(np.abs(t) < FARTHEST_TWIN)
-    move = t[near, None]
-    guesses = SetPoints(z[near] + move * dz[near], p[near] + move * dp[near], planes[near])
-    return guesses, np.asarray(some[near])
-
-
-def _onto_set(setting: Setting, at: SetPoints) -> Settled:
-    """States of the set orthogonally above points near it."""
-    structure, free = setting.structure, setting.free
-    directions = free_directions(structure, free, len(at))
-    frame = embedded_planes(structure, free, at.rows)
-    return settle(structure, at.z, at.p, directions, [], GUARDS, frame)
 
 
 STARTS = 12

@@ -25,7 +25,6 @@ from equimorph.tasks.shapes.prediction import (
     predictor,
     solution_family,
     states_with_values,
-    twin_guesses,
 )
 from equimorph.tasks.stable_part import feasible_vertices, stable_vertices
 from equimorph.tasks.start import check_cells
@@ -154,9 +153,10 @@ def solve_shape(
     """Find all states of a set at which descriptors take given values.
 
     Cells over which the linear interpolation of the descriptors comes near the targets predict
-    states, which Newton corrects along the set; folds are no obstacle. A solution that no cell
-    predicts shares its cell with another one: refine the set there. With more descriptors than free
-    parameters the fits of least squares are found, with fewer the family of solutions.
+    states, which Newton corrects along the set; folds are no obstacle. Where cells predict one of
+    two close solutions, the other one follows from it, or from the curve on which both meet
+    (`DescriptorChart`). With more descriptors than free parameters the fits of least squares are
+    found, with fewer the family of solutions.
 
     Parameters
     ----------
@@ -299,13 +299,14 @@ def _solve(
     guesses, owner = _guesses(known, targets)
     exact = states_with_values(known.setting, guesses, known.descriptors, targets[owner])
     z, p, found = exact.z, exact.p, exact.found
-    if targets.shape[1] == len(eset.names):
-        starts, of = twin_guesses(known, exact, guesses.rows, np.flatnonzero(found))
-        twins = states_with_values(known.setting, starts, known.descriptors, targets[owner[of]])
-        owner = np.concatenate([owner, owner[of]])
+    if targets.shape[1] == len(eset.names) and known.chart is not None:
+        charted = known.chart.find(targets)
+        owner = np.concatenate([owner, charted.point])
         order = np.argsort(owner, kind="stable")
-        z, p = np.concatenate([z, twins.z])[order], np.concatenate([p, twins.p])[order]
-        found, owner = np.concatenate([found, twins.found])[order], owner[order]
+        z = np.concatenate([z, charted.states.z])[order]
+        p = np.concatenate([p, charted.states.p])[order]
+        found = np.concatenate([found, np.ones(len(charted.point), bool)])[order]
+        owner = owner[order]
     found &= eset.box.holds(p[:, known.setting.free], slack=AT_EDGE)
     found[found] &= structure.resolved(z[found], p[found])
     found[found] &= worst_relative_excess(within, z[found], p[found]) <= AT_EDGE

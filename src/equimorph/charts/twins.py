@@ -1,0 +1,76 @@
+"""Second states beside given ones with the same coordinates, where these nearly fold.
+
+Along the direction v in which the coordinates change least, their component along u follows
+``σ t + c t²/2``, which vanishes again at ``t = −2σ/c``. The curvature c comes from states of the set
+on both sides along v, so that no singular state has to be known.
+"""
+
+import numpy as np
+
+from equimorph.arrays import Items, Lanes, Parameters, Points, Rows
+from equimorph.charts.coordinates import Coordinates, solve_on_the_set
+from equimorph.charts.location import Cells, Found
+from equimorph.charts.singular_pairs import unite
+from equimorph.equilibria.settle import Guards, Settled, embedded_planes, free_directions, settle
+from equimorph.manifold.geometry.setting import Setting
+from equimorph.manifold.geometry.tangents import split_step, tangent_frames
+from equimorph.structures import States
+
+STEP = 0.02
+"""Step along the set, in the metric, by which the bending of the coordinates is measured."""
+FARTHEST = 0.5
+"""Distance along the set, in the metric, within which a second state is looked for."""
+GUARDS = Guards(iterations=30, longest=0.3, converged=1e-7)
+"""The last correction is 1e-7, so that Newton's method leaves an error at round-off."""
+
+
+def add_twins(cells: Cells, found: Found, points: Points) -> Found:
+    """States found over points, and their twins on the same cells."""
+    if len(found.point) == 0:
+        return found
+    place = np.searchsorted(cells.numbers, found.cell)
+    rows = cells.planes(place)
+    z, p, of = _guesses(cells.coordinates, found.states.z, found.states.p, rows, cells.ranges)
+    own = solve_on_the_set(cells.coordinates, z, p, points[found.point[of]], rows[of])
+    some = np.flatnonzero(own.found)
+    states, of = States(cells.eset.structure, own.z[some], own.p[some]), of[some]
+    cell = cells.nearest(states)
+    good = np.flatnonzero(cells.hold(states, own.index[some], cell))
+    new = Found(
+        states[good],
+        found.point[of[good]],
+        cells.numbers[cell[good]],
+        np.zeros(len(good), bool),
+    )
+    return unite(cells, found, new)
+
+
+def _guesses(
+    coordinates: Coordinates, z: Lanes, p: Parameters, rows: Rows, ranges: np.ndarray
+) -> tuple[Lanes, Parameters, Items]:
+    """Guesses of the twins that are near enough, and the number of the state of each."""
+    setting = coordinates.setting
+    frames = tangent_frames(setting, z, p, rows)
+    slopes = coordinates.derivative(z, p, frames) / ranges[:, None]
+    left, sizes, right = np.linalg.svd(slopes)
+    steps = np.einsum("lk,lkf->lf", right[:, -1], frames)
+    dz, dp = split_step(setting, steps)
+    values = []
+    for side in (-STEP, 0.0, STEP):
+        there = _onto_set(setting, z + side * dz, p + side * dp, rows)
+        values.append(coordinates(there.z, there.p) / ranges)
+    second = (values[0] - 2.0 * values[1] + values[2]) / STEP**2
+    bend = np.einsum("lm,lm->l", left[:, :, -1], second)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        t = -2.0 * sizes[:, -1] / bend
+    near = np.flatnonzero(np.abs(t) < FARTHEST)
+    move = t[near, None]
+    return z[near] + move * dz[near], p[near] + move * dp[near], near
+
+
+def _onto_set(setting: Setting, z: Lanes, p: Parameters, rows: Rows) -> Settled:
+    """States of the set orthogonally above points near it."""
+    structure, free = setting.structure, setting.free
+    directions = free_directions(structure, free, len(z))
+    frame = embedded_planes(structure, free, rows)
+    return settle(structure, z, p, directions, [], GUARDS, frame)
