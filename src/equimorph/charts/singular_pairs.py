@@ -18,7 +18,6 @@ from scipy.spatial import cKDTree
 from equimorph.arrays import Float, Frames, Items, Place, Places, Points
 from equimorph.charts.coordinates import Coordinates, solve_on_the_set
 from equimorph.charts.location import Cells, Found
-from equimorph.manifold.complex.kept_tables import places_of
 from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.geometry.tangents import frames_in_embedding, split_step, tangent_frames
 from equimorph.manifold.lookup.cell_index import Hits

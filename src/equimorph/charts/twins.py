@@ -1,8 +1,8 @@
 """Second states beside given ones with the same coordinates, where these nearly fold.
 
 Along the direction v in which the coordinates change least, their component along u follows
-``σ t + c t²/2``, which vanishes again at ``t = −2σ/c``. The curvature c comes from states of the set
-on both sides along v, so that no singular state has to be known.
+``σ t + c t²/2``, which vanishes again at ``t = −2σ/c``. The curvature c comes from states of the
+set on both sides along v, so that no singular state has to be known.
 """
 
 import numpy as np

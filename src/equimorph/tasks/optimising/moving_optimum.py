@@ -26,7 +26,7 @@ from equimorph.tasks.optimising.optimum_path import (
 )
 from equimorph.tasks.optimising.programme import Objective, Programme, is_stability, stability
 from equimorph.tasks.optimising.sqp import ITERATIONS, CriticalPoint, descend
-from equimorph.tasks.optimising.tangent_steps import project_onto_set, step_along, tangent_plane_at
+from equimorph.tasks.optimising.tangent_steps import project_onto_set, step_along, tangent_planes
 from equimorph.tasks.route import schedule_of
 from equimorph.tasks.start import Start, check_stable, start_state
 from equimorph.tolerances import FEASIBLE
@@ -255,7 +255,7 @@ def follow_minimum(problem: MovingProblem, start: State, time: float) -> Followe
     jumps, and the search goes on from the optimum beyond.
     """
     legs = problem.course.legs
-    plane = tangent_plane_at(problem.programme(time).setting, start)
+    plane = tangent_planes(problem.programme(time).setting, start.batch)
     begin = SetPoints(start.z[None], start.p[None], plane)
     first = None
     for later in LATER:

@@ -22,7 +22,7 @@ from equimorph.tasks.optimising.feasible_starts import (
 )
 from equimorph.tasks.optimising.programme import Objective, Programme, is_stability, stability
 from equimorph.tasks.optimising.sqp import CriticalPoint, descend
-from equimorph.tasks.optimising.tangent_steps import move_into_box, tangent_plane_at
+from equimorph.tasks.optimising.tangent_steps import move_into_box, tangent_planes
 from equimorph.tasks.planning.planner import plan
 from equimorph.tasks.route import Route
 from equimorph.tasks.stable_part import (
@@ -272,7 +272,9 @@ def _starts(
 def _starts_around(ground: EquilibriumSet | None, programme: Programme, start: State) -> SetPoints:
     """Vertices of the feasible piece around the start that no neighbour beats; else the start."""
     if ground is None or not len(ground.cells):
-        return SetPoints(start.z[None], start.p[None], tangent_plane_at(programme.setting, start))
+        return SetPoints(
+            start.z[None], start.p[None], tangent_planes(programme.setting, start.batch)
+        )
     return _best_vertices(ground, programme, stable_vertices(ground))
 
 

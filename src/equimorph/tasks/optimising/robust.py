@@ -20,7 +20,7 @@ from equimorph.tasks.optimising.certificates import Certificate, certificate
 from equimorph.tasks.optimising.optimum import Optimum, Sense, optimise
 from equimorph.tasks.optimising.programme import Objective, Programme, stability
 from equimorph.tasks.optimising.sqp import CriticalPoint, descend
-from equimorph.tasks.optimising.tangent_steps import tangent_plane_at
+from equimorph.tasks.optimising.tangent_steps import tangent_planes
 from equimorph.tolerances import FEASIBLE
 
 Branches = Float[np.ndarray, "lanes m"]
@@ -212,7 +212,9 @@ def _on_edges(question: _Question, near: Optimum, room: float) -> list[_End]:
             continue
         programme = _edge_programme(question, number)
         state = near.state
-        start = SetPoints(state.z[None], state.p[None], tangent_plane_at(programme.setting, state))
+        start = SetPoints(
+            state.z[None], state.p[None], tangent_planes(programme.setting, state.batch)
+        )
         ends += [
             _edge(programme, corner, end)
             for end in descend(programme, start)

@@ -12,18 +12,18 @@ from equimorph.manifold.geometry.exact_points import Aim, correct_points
 from equimorph.manifold.geometry.setting import Setting, embed
 from equimorph.manifold.geometry.tangents import frames_in_embedding, split_step, tangent_frames
 from equimorph.manifold.queries.nearest import FAR, SetPoints
-from equimorph.structures import State
+from equimorph.structures import State, States
 
 Steps = Float[np.ndarray, "lanes d"]
 
 
-def tangent_plane_at(setting: Setting, state: State) -> Float[np.ndarray, "1 d coordinates"]:
-    """Plane near the tangent space of a stable state."""
+def tangent_planes(setting: Setting, states: States) -> Rows:
+    """Planes near the tangent spaces of stable states."""
     structure, free = setting.structure, setting.free
-    dz, dp = answers(structure, state.z[None], state.p[None], free)
-    u = dz[0][:, : structure.unknowns] * np.sqrt(structure.mass)
-    both = np.concatenate([u, dp[0][:, free] / structure.scales[free]], axis=1)
-    return np.ascontiguousarray(np.linalg.qr(both.T)[0].T[None])
+    dz, dp = answers(structure, states.z, states.p, free)
+    u = dz[:, :, : structure.unknowns] * np.sqrt(structure.mass)
+    both = np.concatenate([u, dp[:, :, free] / structure.scales[free]], axis=2)
+    return np.ascontiguousarray(np.swapaxes(np.linalg.qr(np.swapaxes(both, 1, 2))[0], 1, 2))
 
 
 def unconstrained_setting(eset: EquilibriumSet) -> Setting:

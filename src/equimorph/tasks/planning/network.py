@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components, dijkstra
+from scipy.spatial import cKDTree
 
 from equimorph.arrays import Bool, Flags, Float, Int, Lanes, Parameters, Some, Values
 from equimorph.equilibria import ParameterLine, TraceOptions
@@ -28,6 +29,9 @@ BROAD = 0.1
 """The same where the cost is summed up from step to step."""
 MATCH = 1e-5
 """Distance in the metric within which a lift leads to the state that is meant."""
+
+DETOUR, APART = 0.1, 0.15
+"""Part by which another path over the mesh may be longer, and its distance in such parts."""
 
 CRITICAL = (1, 4, 7)
 """Kinds of vertices at which stability ends: on folds, and where sheets cross."""
@@ -166,7 +170,7 @@ def walk_back(
     before: Int[np.ndarray, " nodes"], start: int, goal: int
 ) -> Int[np.ndarray, " n"] | None:
     """Path to a goal by the predecessors of all nodes; None if it was not reached."""
-    if before[goal] < 0:
+    if before[goal] < 0 and goal != start:
         return None
     path = [goal]
     while path[-1] != start:
@@ -250,21 +254,77 @@ def cheapest_path(eset: EquilibriumSet, ends: Ends, demands: Demands) -> States 
 
     Links are lifted only when a path uses them; what was found is remembered.
     """
+    return next(cheap_paths(eset, ends, demands), None)
+
+
+def cheap_paths(eset: EquilibriumSet, ends: Ends, demands: Demands) -> Iterator[States]:
+    """Cheapest path over the network, then cheap ones that lie apart from all before, if any.
+
+    The cheapest paths over single vertices are those of two trees, from start and goal. Of vertices
+    farther than a share of the length from the paths before, that with the cheapest path is next.
+    """
     network = network_of(eset)
     allowed = network.admissible(eset, demands)[network.pairs].all(axis=1)
     broken, _ = network.verdicts(demands)
     costs = network.costs(eset, demands.objective)
     states, (own, own_costs) = nodes_with_ends(eset, ends), end_links(eset, ends, demands)
     count = len(states)
+    place, far = metric_places(states), np.ones(count, bool)
+    trees, best = None, np.inf
     while True:
         inner = np.flatnonzero(allowed & ~broken)
-        pairs = np.concatenate([network.pairs[inner], own])
-        weights = np.concatenate([costs[inner], own_costs])
-        path = shortest_path(count, pairs, weights, (count - 2, count - 1))
-        if path is None:
-            return None
-        if network.lift_links(inner[on_paths(network.pairs[inner], [path])], states, demands):
-            return states[path]
+        if trees is None:
+            pairs = np.concatenate([network.pairs[inner], own])
+            trees = _Trees.of(count, pairs, np.concatenate([costs[inner], own_costs]))
+        over = np.where(far, trees.over, np.inf)
+        middle = int(over.argmin())
+        if not np.isfinite(over[middle]) or over[middle] > (1.0 + DETOUR) * best:
+            return
+        path = trees.path(middle)
+        if not network.lift_links(inner[on_paths(network.pairs[inner], [path])], states, demands):
+            trees = None
+            continue
+        best = min(best, over[middle])
+        far &= cKDTree(place[path]).query(place)[0] > APART * best
+        yield states[path]
+
+
+@dataclass(frozen=True)
+class _Trees:
+    """Cheapest paths from start and goal, the last two nodes, to all others."""
+
+    cost: Float[np.ndarray, "2 nodes"]
+    before: Int[np.ndarray, "2 nodes"]
+
+    @classmethod
+    def of(cls, count: int, pairs: Pairs, costs: Values) -> "_Trees":
+        weights = np.maximum(costs, 1e-300)
+        graph = coo_array((weights, pairs.T), shape=(count, count)).tocsr()
+        ends = [count - 2, count - 1]
+        return cls(*dijkstra(graph, directed=False, indices=ends, return_predecessors=True))
+
+    @property
+    def over(self) -> Values:
+        """Costs of the cheapest paths over each node."""
+        return np.asarray(self.cost.sum(axis=0))
+
+    def path(self, middle: int) -> Int[np.ndarray, " n"]:
+        """Cheapest path over a node."""
+        count = self.cost.shape[1]
+        there, back = (
+            walk_back(before, end, middle)
+            for before, end in zip(self.before, (count - 2, count - 1), strict=True)
+        )
+        assert there is not None
+        assert back is not None
+        return np.concatenate([there, back[-2::-1]])
+
+
+def metric_places(states: States) -> Float[np.ndarray, "lanes coordinates"]:
+    """Configurations in the metric and scaled parameters."""
+    structure = states.structure
+    u = states.z[:, : structure.unknowns] * np.sqrt(structure.mass)
+    return np.concatenate([u, states.p / structure.scales], axis=1)
 
 
 def on_paths(pairs: Pairs, paths: list[Int[np.ndarray, " n"]]) -> Flags:

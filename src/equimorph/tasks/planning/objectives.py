@@ -9,7 +9,8 @@ import numpy as np
 
 from equimorph.argument_checks import check_arguments
 from equimorph.argument_kinds import ANYTHING, short
-from equimorph.arrays import Float, Int
+from equimorph.arrays import Flags, Float, Int
+from equimorph.equilibria import settle
 from equimorph.errors import InputError, suggestion
 from equimorph.model import Constraint, Descriptor, Rates, Schedule, names_of
 from equimorph.structures import States, Structure, stability_margin
@@ -22,6 +23,8 @@ Term = Name | Rates | Descriptor
 NAMES: tuple[Name, ...] = get_args(Name)
 LEAST_MARGIN = 1e-6
 """Margin, or value of a descriptor, below which clearance counts no further."""
+LONGEST = 1.2
+"""Way between two states over that at their mean parameters, in their chord, at most."""
 EXACT, NEAR, ROUGH = 1e-11, 1e-4, 1e-2
 """Relative errors of margins: in results, where paths are compared, and on a mesh."""
 
@@ -130,9 +133,51 @@ class Objective:
         return schedule
 
     def along(self, states: States) -> float:
-        """Cost of the way through states in turn."""
+        """Cost of the way through states in turn, between which the parameters go straight."""
+        if self.is_length:
+            return sum(weight for weight, _ in self.terms) * length_through(states)
         at = np.arange(len(states))
         return float(self.costs(states, at[:-1], at[1:], EXACT).sum())
+
+
+def length_through(states: States) -> float:
+    """Length in the metric of the way through states in turn, to fourth order in the steps.
+
+    The arc through two states and the one at the mean of their parameters, with chords a and b to
+    it and c between them, has the length ``a + b + (a + b − c) (a² − ab + b²)/(3ab)`` up to the
+    fifth order: the curvature follows from what both chords together are longer. Each step is two
+    such arcs.
+    """
+    moved = np.flatnonzero(_chords(states[:-1], states[1:]) > 0.0)
+    first, last = states[:-1][moved], states[1:][moved]
+    middle, good = _between(first, last)
+    arc = _arcs(first, middle) + _arcs(middle, last)
+    return float(np.where(good, arc, _chords(first, last)).sum())
+
+
+def _arcs(first: States, last: States) -> Values:
+    """Lengths of arcs between pairs of states; their chords where no state is between them."""
+    middle, good = _between(first, last)
+    a, b, chord = _chords(first, middle), _chords(middle, last), _chords(first, last)
+    arc = a + b + (a + b - chord) * (a**2 - a * b + b**2) / np.maximum(3.0 * a * b, 1e-300)
+    return np.where(good, arc, chord)
+
+
+def _between(first: States, last: States) -> tuple[States, Flags]:
+    """States at the mean parameters of pairs, and whether they lie between them."""
+    amid = settle(first.structure, 0.5 * (first.z + last.z), 0.5 * (first.p + last.p))
+    middle = States(first.structure, amid.z, amid.p)
+    around = _chords(first, middle) + _chords(middle, last)
+    return middle, amid.found & (around < LONGEST * _chords(first, last))
+
+
+def _chords(first: States, last: States) -> Values:
+    return _cost("length", _bare(first), _bare(last))
+
+
+def _bare(states: States) -> Places:
+    none = np.zeros((len(states), 0))
+    return Places(states, none, none)
 
 
 @dataclass(frozen=True)

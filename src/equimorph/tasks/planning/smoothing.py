@@ -19,6 +19,8 @@ Places = Float[np.ndarray, "_ parameters"]
 
 KNOTS = 120
 """Points of a rounded polygon, through which the spline runs."""
+WINDOW = 0.2
+"""Largest window of the average, as a share of the length."""
 HALVINGS = 6
 """How often the roundings are halved before a route is refused."""
 
@@ -86,7 +88,7 @@ def _corners(route: Route) -> list[int]:
 def _round_corners(corners: Places, tolerance: float) -> Places:
     """Points of the rounded polygon, as far from it as allowed."""
     length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(corners, axis=0), axis=1))])
-    window = 0.5 * np.diff(length).min()
+    window = WINDOW * length[-1]
     while True:
         curve = _average(corners, length, window)
         if _off(curve, corners) <= tolerance or window < 1e-6 * length[-1]:
@@ -105,10 +107,11 @@ def _average(corners: Places, length: Float[np.ndarray, " corners"], window: flo
     places = at[:, None] + window * nodes
     out = np.empty((KNOTS, corners.shape[1]))
     for k in range(corners.shape[1]):
-        inner = np.interp(places, length, corners[:, k])
-        first = (corners[1, k] - corners[0, k]) / length[1]
-        last = (corners[-1, k] - corners[-2, k]) / (length[-1] - length[-2])
-        inner += np.minimum(places, 0.0) * first + np.maximum(places - length[-1], 0.0) * last
+        inner = np.interp(np.abs(places), length, corners[:, k])
+        beyond = np.interp(2.0 * length[-1] - places, length, corners[:, k])
+        # reflected in its ends, the polygon keeps them
+        inner = np.where(places < 0.0, 2.0 * corners[0, k] - inner, inner)
+        inner = np.where(places > length[-1], 2.0 * corners[-1, k] - beyond, inner)
         out[:, k] = inner @ weights
     out[0], out[-1] = corners[0], corners[-1]
     return out

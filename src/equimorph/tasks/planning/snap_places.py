@@ -34,12 +34,15 @@ class SnapPlace:
         State just before the fold, on the way there.
     beyond
         Equilibrium after the snap where the parameters have gone a little beyond the fold.
+    cost
+        Of the straight moves there and on.
     """
 
     fold: State
     landing: State
     approach: State
     beyond: State
+    cost: float
 
 
 @dataclass(frozen=True)
@@ -58,7 +61,8 @@ class _Places:
         if not np.isfinite(self.cost[k]):
             return None
         fold = State(self.landings.structure, self.folds.z[k], self.folds.p[k])
-        return SnapPlace(fold, self.landings[k], self.approach[k], self.beyond[k])
+        cost = float(self.cost[k])
+        return SnapPlace(fold, self.landings[k], self.approach[k], self.beyond[k], cost)
 
 
 def cheapest_place(

@@ -18,6 +18,7 @@ from equimorph.tasks.distances import distance
 from equimorph.tasks.planning.network import (
     Demands,
     Ends,
+    connect,
     end_links,
     neighbours,
     network_of,
@@ -26,10 +27,8 @@ from equimorph.tasks.planning.network import (
     walk_back,
 )
 from equimorph.tasks.planning.objectives import ROUGH
-from equimorph.tasks.planning.snap_places import cheapest_place
+from equimorph.tasks.planning.snap_places import SnapPlace, cheapest_place
 from equimorph.tasks.planning.straightening import (
-    follow_direction,
-    route_over_corners,
     straight_corners,
     way_points_of,
 )
@@ -40,8 +39,13 @@ SAMPLES = 9
 """Points of each fold whose snaps are followed to where they land."""
 MOST_RUNS = 8
 """Runs of the stability boundary, or sequences of them, that are compared."""
-DETOUR = 0.1
-"""Part by which paths over the mesh may be longer than what is made of them."""
+DETOUR = 0.5
+"""Part by which paths over the mesh may be longer than what is made of them: they lead over sampled
+places of a fold only."""
+ROUNDS = 3
+"""How often the parts before and after a snap are straightened, and its place is sought anew."""
+SHARES, ENOUGH = (0.0, 0.5, 0.75, 0.9, 0.97), 1e-4
+"""Shares of the part before a snap from which straight moves lead to its fold, and least gain."""
 NOWHERE = "not even by snaps does the goal lie on a piece that can be reached"
 
 
@@ -112,26 +116,32 @@ def route_with_snaps(
     demands: Demands,
     price: float,
     monitor: Sequence[Descriptor],
+    known: float = np.inf,
 ) -> Route:
-    """Cheapest route on which every snap costs `price`, verified piece by piece."""
-    search, best = _Search(eset, ends, demands, price), refusal(NOWHERE)
+    """Cheapest route with snaps, of which each costs `price`, verified piece by piece.
+
+    known: cost of a route without a snap, than which it is to be cheaper.
+    """
+    search, best, least = _Search(eset, ends, demands, price), refusal(NOWHERE), known
     for _ in range(MOST_RUNS):
         path = search.path()
-        if path is None or (best.arrived and path.cost > (1.0 + DETOUR) * best.cost):
+        if path is None or path.cost > (1.0 + DETOUR) * least:
             break
         route = _verify(eset, ends, path, demands, monitor)
         if route.arrived:
             route = replace(route, cost=route.cost + price * len(route.snaps))
         if not best.arrived or route.cost < best.cost:
             best = route
-        if not path.gates:
-            break
+            least = min(least, route.cost) if route.arrived else least
         search.close(path.gates)
     return best
 
 
 class _Search:
-    """The network with one-way links through the gates."""
+    """The network twice, before any snap and after one, with one-way links through the gates.
+
+    So every path from the start before to the goal after snaps at least once.
+    """
 
     def __init__(self, eset: EquilibriumSet, ends: Ends, demands: Demands, price: float) -> None:
         self.eset, self.demands, self.price = eset, demands, price
@@ -182,24 +192,27 @@ class _Search:
         to_folds = np.concatenate([np.zeros(0), *(self.gates[k].costs for k in open_gates)])
         many = [len(self.gates[k].sources) for k in open_gates]
         targets = self.first + np.repeat(np.array(open_gates, dtype=int), many)
-        rows = np.concatenate([both[:, 0], both[:, 1], sources])
-        columns = np.concatenate([both[:, 1], both[:, 0], targets])
-        costs = np.concatenate([weights, weights, to_folds + self.price])
-        shape = (len(self.states), len(self.states))
+        count = len(self.states)
+        one, other = both.T
+        rows = [one, other, one + count, other + count, sources, sources + count]
+        columns = [other, one, other + count, one + count, targets + count, targets + count]
+        costs = np.concatenate([*[weights] * 4, *[to_folds + self.price] * 2])
+        pairs = np.concatenate(rows), np.concatenate(columns)
         # of links given twice, like that from start to goal, sparse matrices would add the costs
-        graph = coo_array((np.maximum(costs, 1e-300), (rows, columns)), shape=shape).tocsr()
-        start, goal = self.first - 2, self.first - 1
+        graph = coo_array((np.maximum(costs, 1e-300), pairs), shape=(2 * count, 2 * count)).tocsr()
+        start, goal = self.first - 2, count + self.first - 1
         cost, before = dijkstra(graph, indices=start, return_predecessors=True)
         return walk_back(before, start, goal), float(cost[goal])
 
     def _divide_at_snaps(self, path: Int[np.ndarray, " n"], cost: float) -> SnapPath:
         """Parts of a path between its snaps."""
+        nodes = path % len(self.states)
         cuts = [
             k + 1
-            for k, (a, b) in enumerate(pairwise(path.tolist()))
+            for k, (a, b) in enumerate(pairwise(nodes.tolist()))
             if b >= self.first and self._is_snap(a, b)
         ]
-        parts = np.split(path, cuts)
+        parts = np.split(nodes, cuts)
         return SnapPath(
             [self.states[part] for part in parts],
             [int(p[0]) - self.first for p in parts[1:]],
@@ -219,9 +232,6 @@ def _verify(
     monitor: Sequence[Descriptor],
 ) -> Route:
     """Lift every part finely; snaps start from where the lifts meet the folds."""
-    if not path.gates:
-        corners = straight_corners(eset, follow_direction(path.stable[0], ends), demands)
-        return route_over_corners(eset, follow_direction(corners, ends), demands, monitor)
     gates = gates_of(eset, demands)
     here, paths, snaps = ends[0], list[Path](), list[Landing]()
     part, begin, way_points = path.stable[0], Corners(), Corners()
@@ -266,7 +276,7 @@ def _crossing(
     """Straighten the parts before and after a snap, which happens where that costs least.
 
     First with straight moves from the start or the end of the part before, to the end or the start
-    of the part after; then from the last corner before to the first one after.
+    of the part after; then between corners of the straightened parts.
     """
     last = len(onward) - 1
     for i, j in (
@@ -280,18 +290,39 @@ def _crossing(
             break
     else:
         return None
-    before = straight_corners(
-        eset, join_states(eset.structure, (part[: i + 1], place.approach.batch)), demands
-    )
-    after = straight_corners(
-        eset, join_states(eset.structure, (place.beyond.batch, onward[j:])), demands
-    )
-    better = cheapest_place(eset, snap, before[len(before) - 2], after[1], demands)
-    place = place if better is None else better
+    parts = part[: i + 1], onward[j:]
+    best, least = _join(eset, parts, place), np.inf
+    for _ in range(ROUNDS):
+        before, after = (
+            straight_corners(eset, join_states(eset.structure, pair), demands)
+            for pair in ((parts[0], place.approach.batch), (place.beyond.batch, parts[1]))
+        )
+        spent, owed = _costs_along(before, demands), _costs_along(after, demands)
+        m = max(int(np.searchsorted(owed, 0.5 * owed[-1])), 1)
+        before_now = least
+        for k in np.unique(np.searchsorted(spent[:-1], np.array(SHARES) * spent[-1], "right") - 1):
+            nearer = cheapest_place(eset, snap, before[k], after[m], replace(demands, closely=True))
+            if nearer is not None and spent[k] + nearer.cost + owed[-1] - owed[m] < least:
+                least = spent[k] + nearer.cost + owed[-1] - owed[m]
+                place, parts = nearer, (before[: k + 1], after[m:])
+                best = _join(eset, parts, place)
+        if least > (1.0 - ENOUGH) * before_now:
+            break
+    return best
+
+
+def _join(eset: EquilibriumSet, parts: tuple[States, States], place: SnapPlace) -> _Crossing:
+    """Crossing at a place, between the corners before and after it."""
     return _Crossing(
-        join_states(eset.structure, (before[:-1], place.approach.batch)),
-        join_states(eset.structure, (place.beyond.batch, after[1:])),
+        join_states(eset.structure, (parts[0], place.approach.batch)),
+        join_states(eset.structure, (place.beyond.batch, parts[1])),
     )
+
+
+def _costs_along(way: States, demands: Demands) -> Float[np.ndarray, " corners"]:
+    """Costs of straight lifts from the first corner to each."""
+    legs = connect(way[:-1], way[1:], replace(demands, closely=True))[1]
+    return np.concatenate([[0.0], np.cumsum(legs)])
 
 
 def _landing(fold: State, gate: Gate) -> Landing | None:
