@@ -89,7 +89,9 @@ def cap_slopes(
     def worst(sign: float, k: int) -> Values:
         dz, dp = split_step(setting, sign * METRIC_DIFFERENCE * frames[:, k])
         # beyond a barrier of a reduction the excess is infinite
-        return np.clip(worst_excess(setting.constraints, z + dz, p + dp), -BEYOND, BEYOND)
+        return np.asarray(
+            np.clip(worst_excess(setting.constraints, z + dz, p + dp), -BEYOND, BEYOND)
+        )
 
     slopes = [worst(1.0, k) - worst(-1.0, k) for k in range(frames.shape[1])]
     return np.stack(slopes, axis=1) / (2.0 * METRIC_DIFFERENCE)
