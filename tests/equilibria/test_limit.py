@@ -93,7 +93,7 @@ def test_rod_pulled_straight_is_lost_where_its_elements_are_too_long():
     assert path.arrived
 
 
-@pytest.mark.parametrize("bound", [1e6, 1e12])
+@pytest.mark.parametrize("bound", [1e6, 1e12, 1e150])
 def test_limits_do_not_depend_on_how_far_the_bound_is(bound):
     """The spring at x_l = 0.8 snaps at F = 0.0513907783; the start is as regular as ever."""
     spring = em.Spring()
@@ -108,3 +108,17 @@ def test_maps_do_not_depend_on_how_far_the_bound_is():
     grid = em.Grid(x_l=(0.6, 0.9, 3), k=(1, 2, 3))
     near, far = (em.limit_load_map(em.Spring(), grid, "F", bound=b) for b in (10.0, 1e12))
     np.testing.assert_allclose(far.value, near.value, rtol=1e-12)
+
+
+@pytest.mark.parametrize("bound", [1e151, 1e300])
+def test_values_whose_squares_overflow_are_refused(bound):
+    spring, said = em.Spring(), r"`F` must be at most 1e\+150 in size; got 1e\+"
+    up = spring.natural_state(x_l=0.8)
+    grid = em.Grid(x_l=(0.6, 0.9, 3), k=(1, 2, 3))
+    for call in (
+        lambda: em.limit_load(up, "F", bound=bound),
+        lambda: em.lift(up, {"F": bound}),
+        lambda: em.limit_load_map(spring, grid, "F", bound=bound),
+    ):
+        with pytest.raises(InputError, match=said):
+            call()

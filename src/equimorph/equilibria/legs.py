@@ -78,7 +78,7 @@ def replace_parameters(structure: Structure, here: Parameters, values: Waypoint)
         if value is None:
             continue
         parameter, numbers = structure.parameters[place], _numbers(name, value, len(here))
-        inside = np.isfinite(numbers) & (numbers > parameter.lower) & (numbers < parameter.upper)
+        inside = parameter.admits(numbers)
         if not inside.all():
             parameter.check(float(numbers[~inside].ravel()[0]) if numbers.ndim else float(numbers))
         out[:, place] = numbers

@@ -140,8 +140,8 @@ def limit_load(
     [Feher2025]_, section 3.2.1, conditions C1 and C2.
     """
     parameters = state.structure.parameters
-    if bound is None:
-        bound = 100.0 * parameters[position(parameters, load)].scale
+    steered = parameters[position(parameters, load)]
+    bound = 100.0 * steered.scale if bound is None else steered.check(bound)
     rise = {load: bound}
     if isinstance(state, States):
         return _many(state, rise, tuple(within), options, progress)

@@ -12,10 +12,12 @@ from equimorph.argument_checks import check_arguments
 from equimorph.argument_kinds import is_number
 from equimorph.argument_notes import BOUNDS, DIVIDED
 from equimorph.argument_vocabulary import FINITE, PERIOD, POSITIVE
-from equimorph.arrays import Float, Place
+from equimorph.arrays import Bool, Float, Place
 from equimorph.errors import InputError, suggestion
 
 Samples = Float[np.ndarray, "knots *lanes"]
+LARGEST = 1e150
+"""Largest size of a value, in scales: squares of distances between parameters stay finite."""
 
 
 class Spline:
@@ -110,7 +112,10 @@ class Parameter:
     def check(self, value: float) -> float:
         """Return `value` as a float, or raise `InputError` if it has no meaning."""
         number = float(value) if is_number(value) and FINITE.holds(value) else np.nan
-        if not (np.isfinite(number) and self.lower < number < self.upper):
+        if abs(number) > LARGEST * self.scale:
+            most = f"{LARGEST * self.scale:g}"
+            raise InputError(f"`{self.name}` must be at most {most} in size; got {value!r}.")
+        if not self.admits(np.asarray(number)).all():
             unit = "" if self.unit == "1" else f" in units of {self.unit}"
             quantity = isinstance(value, str) and value.strip()[:1].isdigit()  # like "320 mm"
             remedy = f" Write a number{unit}." if quantity else ""
@@ -118,6 +123,11 @@ class Parameter:
                 f"`{self.name}` must be a finite number{self._limits()}; got {value!r}.{remedy}"
             )
         return number
+
+    def admits(self, numbers: Float[np.ndarray, "*values"]) -> Bool[np.ndarray, "*values"]:
+        """Whether values have a meaning, each."""
+        inside = (numbers > self.lower) & (numbers < self.upper)
+        return np.asarray(inside & (np.abs(numbers) <= LARGEST * self.scale))
 
     def _limits(self) -> str:
         if np.isinf(self.lower) and np.isinf(self.upper):

@@ -142,7 +142,7 @@ def curvature_map(  # noqa: PLR0913  # the knobs of the public face, most by key
     """
     sheet = natural_states_over(structure, grid, load, fixed)
     place = position(structure.parameters, load)
-    lowest = sheet.base[place]
+    lowest, bound = sheet.base[place], structure.parameters[place].check(bound)
     if not lowest < at < bound:
         raise InputError(
             f"`at` must lie between {load} = {lowest:g} and `bound` = {bound:g}; got {at!r}."
@@ -151,7 +151,7 @@ def curvature_map(  # noqa: PLR0913  # the knobs of the public face, most by key
     options = replace(
         options or TraceOptions(), record=False, through_folds=True, through_branch_points=True
     )
-    paths = FirstStablePaths(sheet, place, tuple(within), float(bound), options, float(at), shown)
+    paths = FirstStablePaths(sheet, place, tuple(within), bound, options, float(at), shown)
     found = survey(paths, grid, "paths", progress, workers)
     return CurvatureMap(
         structure, grid, load, paths.within, dict(fixed or {}),

@@ -147,11 +147,11 @@ def limit_load_map(  # noqa: PLR0913  # the knobs of the public face, most by ke
     """
     sheet = natural_states_over(structure, grid, load, fixed)
     place = position(structure.parameters, load)
-    lowest = sheet.base[place]
+    lowest, bound = sheet.base[place], structure.parameters[place].check(bound)
     if not bound > lowest:
         raise InputError(f"`bound` must exceed {load} = {lowest:g}; got {bound!r}.")
     options = replace(options or TraceOptions(), record=False)
-    rays = LimitLoadRays(sheet, place, tuple(within), float(bound), options)
+    rays = LimitLoadRays(sheet, place, tuple(within), bound, options)
     # close to a cusp the two folds are close together: shorter steps separate them
     careful = replace(rays, options=options.finer())
     found = survey(rays, grid, "limit loads", progress, workers, near_curves=careful)
