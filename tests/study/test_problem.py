@@ -22,7 +22,7 @@ WRONG = {
         "intervals",
         "intervalls",
         r"`set\.intervalls` must be a key of `set` \(accuracy, box, checks, fixed, intervals, "
-        r"limit, seed, within\); got intervalls\. Did you mean intervals\?",
+        r"limit, seed, tiles, within\); got intervalls\. Did you mean intervals\?",
     ),
     "unknown key of the structure": (
         'load = "uniform"',

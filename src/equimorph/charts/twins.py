@@ -7,7 +7,7 @@ set on both sides along v, so that no singular state has to be known.
 
 import numpy as np
 
-from equimorph.arrays import Items, Lanes, Parameters, Points, Rows
+from equimorph.arrays import Float, Items, Lanes, Parameters, Points, Rows
 from equimorph.charts.coordinates import Coordinates, solve_on_the_set
 from equimorph.charts.location import Cells, Found
 from equimorph.charts.singular_pairs import unite
@@ -47,7 +47,7 @@ def add_twins(cells: Cells, found: Found, points: Points) -> Found:
 
 def _guesses(
     coordinates: Coordinates, z: Lanes, p: Parameters, rows: Rows, ranges: np.ndarray
-) -> tuple[Lanes, Parameters, Items]:
+) -> tuple[Float[np.ndarray, "n size"], Float[np.ndarray, "n parameters"], Items]:
     """Guesses of the twins that are near enough, and the number of the state of each."""
     setting = coordinates.setting
     frames = tangent_frames(setting, z, p, rows)

@@ -259,7 +259,8 @@ def _differences(
     flat = scalars(z, p)
     found = flat.reshape(-1, lanes, flat.shape[1])
     ahead = found[1 : 1 + k]
-    change = ahead - found[0] if one_sided else 0.5 * (ahead - found[1 + k :])
+    with np.errstate(invalid="ignore"):  # infinite where a reduction prefers no state: not found
+        change = ahead - found[0] if one_sided else 0.5 * (ahead - found[1 + k :])
     return Linear(found[0], change.transpose(1, 2, 0) / h[:, None])
 
 
