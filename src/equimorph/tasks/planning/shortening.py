@@ -39,7 +39,7 @@ REACH = 0.3
 """Longest step of a node, in the metric."""
 STEPS, HALVINGS = 12, 5
 """Newton steps for one strength of the walls, and halvings of each."""
-ENOUGH = 1e-5
+ENOUGH = 1e-4
 """Share of the squared length that the last step gains."""
 
 FEW, NODES, MOST_NODES = 20, 48, 128
@@ -63,11 +63,6 @@ class Curve:
     at: SetPoints
     walls: Walls
     shares: Values
-
-    @property
-    def positions(self) -> Values:
-        """Shares of the length up to each node."""
-        return np.concatenate([[0.0], np.cumsum(self.shares)])
 
 
 @dataclass(frozen=True)
@@ -95,16 +90,16 @@ class Shortener:
         at = SetPoints(nodes.z, nodes.p, rows)
         return Curve(at, self._walls(at), np.full(len(nodes) - 1, 1.0 / (len(nodes) - 1)))
 
-    def corners(self, path: States) -> list[Curve]:
-        """Shortest curves near a path, by straight lifts from node to node, the best one last.
+    def curve_near(self, path: States) -> Curve | None:
+        """Shortest curve near a path, by straight lifts from node to node; None if none is found.
 
-        Walls become weaker as long as all legs can be lifted; no curve if there is none.
+        Walls become weaker as long as all legs can be lifted.
         """
         nodes = self._nodes(path)
         curve = None if nodes is None else self.curve(nodes)
         found = list[Curve]()
         if curve is None or not (curve.walls[1:-1] > 0.0).all():
-            return found
+            return None
         for strength in STRENGTHS:
             # farther from walls there is more room for further nodes
             tried = (self._linked(each, strength) for each in [*found[:-3:-1], curve])
@@ -112,7 +107,7 @@ class Shortener:
             if linked is None:
                 break
             found.append(linked)
-        return found
+        return found[-1] if found else None
 
     def rough_length(self, path: States) -> float:
         """Length of a shortened curve of few nodes near a path; infinite without one."""

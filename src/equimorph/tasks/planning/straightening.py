@@ -11,10 +11,10 @@ from equimorph.equilibria.trace import trace
 from equimorph.equilibria.trace_options import EventCode
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Descriptor, position
-from equimorph.structures import States, join_states
+from equimorph.structures import States
 from equimorph.tasks.planning.corner_moves import ActuatorBox, chords, move_by_chords, move_by_lifts
 from equimorph.tasks.planning.network import Demands, Ends, connect, shortest_path
-from equimorph.tasks.planning.shortening import Curve, Shortener
+from equimorph.tasks.planning.shortening import Shortener
 from equimorph.tasks.route import Corners, Route, refusal, verify_route
 from equimorph.tasks.start import check_equilibrium, check_fixed_parameters, inadmissible
 
@@ -32,8 +32,8 @@ MERGED = 8
 """Legs that may become one."""
 GAIN = 1e-4
 """Share of the cost that a shorter list of corners may cost more."""
-FINE_GAIN, WIDEST = 5e-5, 0.2
-"""The same where corners come from shortest curves, and share of these that one leg passes."""
+FINE_GAIN = 5e-5
+"""The same where corners come from shortest curves."""
 UNSURE = 0.05
 """Share of its cost by which a chord may mislead about a leg."""
 
@@ -164,29 +164,6 @@ def _thin_out(corners: States, demands: Demands, same_class: bool, gain: float =
     return corners if path is None else corners[path]
 
 
-def _few_corners(shortener: Shortener, curves: list[Curve], demands: Demands) -> States:
-    """Fewest of the nodes of two curves whose chain costs hardly more.
-
-    Legs between nodes of the curve that is farther from walls may pass these closely.
-    """
-    far, near = curves
-    parts = [shortener.states(near), shortener.states(far)[1:-1]]
-    at = np.concatenate([near.positions, far.positions[1:-1]])
-    order = np.argsort(at, kind="stable")
-    nodes, at = join_states(parts[0].structure, parts)[order], at[order]
-    place = np.argsort(order)[: len(parts[0])]
-    first, second = np.triu_indices(len(nodes), 1)
-    some = np.flatnonzero((at[second] - at[first] <= WIDEST) & (at[second] > at[first]))
-    first = np.concatenate([first[some], place[:-1]])
-    second = np.concatenate([second[some], place[1:]])
-    linked, cost = connect(nodes[first], nodes[second], demands)
-    whole = cost[len(some) :].sum()
-    pairs = np.unique(np.stack([first[linked], second[linked]], axis=1), axis=0, return_index=True)
-    each = cost[linked][pairs[1]] + FINE_GAIN * whole
-    path = shortest_path(len(nodes), pairs[0], each, (0, len(nodes) - 1))
-    return parts[0] if path is None else nodes[path]
-
-
 def _promising(
     corners: States,
     first: Int[np.ndarray, " pairs"],
@@ -284,12 +261,10 @@ def _shortest_corners(
 ) -> States | None:
     """Corners of the shortest curve near a path; None if none was found."""
     shortener, closely = Shortener(eset, demands), replace(demands, closely=True)
-    curves = shortener.corners(path)
-    if not curves:
+    curve = shortener.curve_near(path)
+    if curve is None:
         return None
-    if same_class or len(curves) == 1:
-        return _thin_out(shortener.states(curves[-1]), closely, same_class, FINE_GAIN)
-    return _few_corners(shortener, curves[-2:], closely)
+    return _thin_out(shortener.states(curve), closely, same_class, FINE_GAIN)
 
 
 def check_margin(route: Route, demands: Demands) -> Route:

@@ -114,7 +114,8 @@ def jacobian_of(
     free = np.array([position(structure.parameters, name) for name in names])
 
     def value(z: Lanes, p: Parameters) -> Values:
-        return np.asarray(np.linalg.det(steering(structure, z, p, free, descriptors)))
+        with np.errstate(invalid="ignore", over="ignore"):  # slopes are infinite on a fold
+            return np.asarray(np.linalg.det(steering(structure, z, p, free, descriptors)))
 
     return Descriptor("jacobian", "", value, "det J_S")
 
