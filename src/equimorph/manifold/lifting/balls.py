@@ -151,7 +151,8 @@ def fill(pairing: Pairing, discs: Discs, wanted: Bool[np.ndarray, " N"]) -> Ball
 
 def _marks(points: Points) -> Float[np.ndarray, " points"]:
     """A number for each point that hardly any other one has."""
-    return np.asarray(points.z @ np.cos(np.arange(points.z.shape[1])))
+    z = points.z[: points.count]
+    return np.asarray(z @ np.cos(np.arange(z.shape[1])))
 
 
 def _large(mesh: BaseMesh) -> Bool[np.ndarray, " N"]:
