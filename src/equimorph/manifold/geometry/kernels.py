@@ -6,6 +6,25 @@ from equimorph.linalg.compiled import njit
 
 
 @njit(nogil=True)
+def nearest_in_list(node, following, points, target, weights, reach):
+    """Find the nearest point of a linked list, and its squared distance; −1 if none is in reach.
+
+    Squared distances below `reach` count; `weights` are of the first squared differences.
+    """
+    best, nearest = -1, reach
+    while node >= 0:
+        distance = 0.0
+        for j in range(weights.shape[0]):
+            distance += weights[j] * (target[j] - points[node, j]) ** 2
+            if distance > nearest:
+                break
+        if distance < nearest:
+            best, nearest = node, distance
+        node = following[node]
+    return best, nearest
+
+
+@njit(nogil=True)
 def match_or_add(vertices, z, mass, same, head, following, stored, count, ids, new):
     """Find each point among the known ones over its vertex, or add it.
 
@@ -13,19 +32,8 @@ def match_or_add(vertices, z, mass, same, head, following, stored, count, ids, n
     (capacity, size). Fills ids and new; returns the new count. Points are the same if closer than
     `same` in the metric.
     """
-    n = mass.shape[0]
     for i in range(vertices.shape[0]):
-        best, nearest = -1, same * same
-        node = head[vertices[i]]
-        while node >= 0:
-            distance = 0.0
-            for j in range(n):
-                distance += mass[j] * (stored[node, j] - z[i, j]) ** 2
-                if distance > nearest:
-                    break
-            if distance < nearest:
-                best, nearest = node, distance
-            node = following[node]
+        best, _ = nearest_in_list(head[vertices[i]], following, stored, z[i], mass, same * same)
         new[i] = best < 0
         if best < 0:
             best = count

@@ -3,6 +3,7 @@
 import numpy as np
 
 from equimorph.linalg.compiled import njit
+from equimorph.manifold.geometry.kernels import nearest_in_list
 
 
 @njit(nogil=True)
@@ -43,17 +44,9 @@ def match_rays(
         if not lengths[i] < longest or counted[here] != index[here]:
             continue
         partners[i] = -1
-        nearest, best = reach**2 * length, -1
-        node = head[targets[i]]
-        while node >= 0:
-            distance = 0.0
-            for j in range(size):
-                distance += weights[j] * (guesses[i, j] - z[node, j]) ** 2
-                if distance > nearest:
-                    break
-            if distance < nearest:
-                nearest, best = distance, node
-            node = following[node]
+        best, _ = nearest_in_list(
+            head[targets[i]], following, z, guesses[i], weights, reach**2 * length
+        )
         if best < 0 or index[best] != index[here] or counted[best] != index[here]:
             continue
         back, product, other = 0.0, weight, weight

@@ -95,10 +95,8 @@ class Shortener:
 
         Walls become weaker as long as all legs can be lifted.
         """
-        nodes = self._nodes(path)
-        curve = None if nodes is None else self.curve(nodes)
-        found = list[Curve]()
-        if curve is None or not (curve.walls[1:-1] > 0.0).all():
+        curve, found = self._curve_along(path, NODES), list[Curve]()
+        if curve is None:
             return None
         for strength in STRENGTHS:
             # farther from walls there is more room for further nodes
@@ -111,15 +109,20 @@ class Shortener:
 
     def rough_length(self, path: States) -> float:
         """Length of a shortened curve of few nodes near a path; infinite without one."""
-        nodes = self._nodes(path, FEW)
-        curve = None if nodes is None else self.curve(nodes)
-        if curve is None or not (curve.walls[1:-1] > 0.0).all():
+        curve = self._curve_along(path, FEW)
+        if curve is None:
             return np.inf
         for strength in STRENGTHS:
             curve = self.shorten(curve, strength)
         return float(np.linalg.norm(np.diff(self._place(curve), axis=0), axis=1).sum())
 
-    def _nodes(self, path: States, count: int = NODES) -> States | None:
+    def _curve_along(self, path: States, count: int) -> Curve | None:
+        """Curve along a path, of about so many nodes; None if one of them meets a wall."""
+        nodes = self._nodes(path, count)
+        curve = None if nodes is None else self.curve(nodes)
+        return curve if curve is not None and (curve.walls[1:-1] > 0.0).all() else None
+
+    def _nodes(self, path: States, count: int) -> States | None:
         """States along a path, about as many as a curve has, inside the box."""
         some = np.unique(np.linspace(0, len(path) - 1, min(len(path), count)).round().astype(int))
         path = path[some]
