@@ -18,6 +18,15 @@ def standing(found):
     return {each.name: each.standing for each in found.arguments}
 
 
+@pytest.mark.parametrize(
+    ("p", "r"), [(0.31, 0.2), (0.1, 0.7), (-0.4, 0.3), (0.7, -0.2), (-0.33, 0.66)]
+)
+def test_pushes_along_soft_modes_meet_close_states(p, r):
+    """Wells as deep as 1e-30 in units of energy: all arguments hold without four of the states."""
+    found = em.find_equilibria(close_sheets(1e-5, 6), {"p": p, "r": r})
+    assert np.sort(found.z[:, 0]) == pytest.approx(close_roots(1e-5, 6, p, r), abs=1e-9)
+
+
 @pytest.mark.parametrize("sheets", [2, 3, 4, 5, 6])
 @pytest.mark.parametrize("distance", [1e-1, 1e-3, 1e-5])
 def test_no_state_is_missing_among_close_ones(sheets, distance):

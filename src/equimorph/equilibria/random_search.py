@@ -6,8 +6,9 @@ import numpy as np
 
 from equimorph.arrays import Float, Int, Lanes, Numbers, Parameters, Values
 from equimorph.equilibria.curves import ParameterLine, growing_force, newton_homotopy
-from equimorph.equilibria.saddles import Pairs, strongest_pushes
+from equimorph.equilibria.saddles import Pairs, steps_for, strongest_pushes
 from equimorph.equilibria.settle import Guards, settle
+from equimorph.equilibria.soft_modes import extent_of_guesses, soft_modes
 from equimorph.equilibria.trace import trace
 from equimorph.equilibria.trace_options import EventCode, TraceOptions
 from equimorph.model import Constraint, worst_relative_excess
@@ -28,6 +29,11 @@ ROUNDS = 8
 """Times that lines are laid through newly found equilibria, at most."""
 PUSHED = 120
 """Most states over a point that are pushed: with more, what they lead to takes most of the time."""
+CROWDED = 0.01
+"""Length of a soft mode, in extents of the guesses, below which a state may have neighbours that
+random pushes step over."""
+FIRM = 100.0
+"""Force of a push along a soft mode, over stiffness times length of the mode."""
 HOMOTOPIES = 0.05
 """Share of the guesses from which Newton homotopy starts (where Newton found nothing)."""
 NUDGE = 0.1
@@ -141,6 +147,29 @@ class Pools:
         outcome = trace(line, ways.start, (), WIDE_STEPS)
         returned = outcome.code == EventCode.RETURNED
         self._polish(outcome.z[returned], np.tile(group[apart], 2)[returned])
+
+    def push_softly(self, begin: int = 0) -> None:
+        """Push equilibria along their softest modes, both ways, where neighbours may be close.
+
+        The steps are as short as the modes: states of every size of these are pushed together.
+        """
+        structure = self.ground.structure
+        new = np.arange(begin, len(self.z))
+        if len(new) == 0:
+            return
+        soft = soft_modes(structure, self.z[new], self.ground.p[self.group[new]])
+        wide = CROWDED * extent_of_guesses(structure, self.ground.p)
+        size = np.floor(np.log10(np.maximum(soft.own_length, SAME_STATE)))
+        for each in np.unique(size[soft.own_length < wide]):
+            lanes = np.tile(np.flatnonzero(size == each), 2)
+            length, group = FIRM * soft.own_length[lanes], self.group[new[lanes]]
+            push = np.abs(soft.eigenvalue[lanes]) * length * np.repeat([1.0, -1.0], len(lanes) // 2)
+            force = np.zeros((len(lanes), structure.size))
+            force[:, : structure.unknowns] = push[:, None] * structure.mass * soft.mode[lanes]
+            line = growing_force(structure, self.ground.p[group], force, length)
+            outcome = trace(line, self.z[new[lanes]], (), steps_for(10.0**each))
+            returned = outcome.code == EventCode.RETURNED
+            self._polish(outcome.z[returned], group[returned])
 
     def _forces(self, pairs: Pairs) -> Lanes:
         """Random forces, as strong as pushes from states to guesses."""

@@ -137,7 +137,7 @@ def states_between(structure: Structure, pairs: Pairs) -> Met:
     lanes, z = np.arange(len(ways.p)), ways.start
     push = _pushes(structure, ways)
     distance = ways.distance(structure)
-    options = _options(float(distance.min()))
+    options = steps_for(float(distance.min()))
     met, pair = [np.zeros((0, structure.size))], [np.zeros(0, int)]
     for _ in range(LEGS):
         line = growing_force(structure, ways.p[lanes], push[lanes], distance[lanes])
@@ -177,8 +177,8 @@ def strongest_pushes(structure: Structure, pairs: Pairs) -> Values:
     return np.asarray(STRONGEST * np.where(np.isfinite(against), against, 0.0).max(axis=1))
 
 
-def _options(distance: float) -> TraceOptions:
-    """Steps that fit the distance of the minima."""
+def steps_for(distance: float) -> TraceOptions:
+    """Steps of pushes that fit the distance of the states that they may meet."""
     return TraceOptions(
         through_folds=True,
         through_branch_points=True,

@@ -289,6 +289,7 @@ def _complete_by_arguments(
         lacking = [number for number in range(len(catches)) if contradicts(graph, number)]
         pools = Pools(ground, generator, graph.z, graph.group)
         pools.push(pushed)
+        pools.push_softly(pushed)
         pushed = len(graph)
         if len(pools.z) == known and not lacking:
             break

@@ -49,6 +49,8 @@ class SoftModes(Columns):
         Distance along the mode, in the metric, over which the eigenvalue changes by its own size:
         about the distance of a saddle from its neighbours. At critical states the distance over
         which the third derivative changes so.
+    own_length
+        The former at critical states, too: about the distance to their neighbours.
     rate
         Size of the eigenvalue at this distance: its inverse is the scale of time.
     critical
@@ -60,6 +62,7 @@ class SoftModes(Columns):
     mode: Modes
     stiffness: Values
     length: Values
+    own_length: Values
     rate: Values
     critical: Flags
 
@@ -89,9 +92,9 @@ def soft_modes(structure: Structure, z: Lanes, p: Parameters) -> SoftModes:
     across = multiply(mode * _response(structure, z, p, mode, np.zeros(len(z))), mass)
     with np.errstate(divide="ignore"):
         eigenvalue = np.where(np.isfinite(across) & (across != 0.0), 1.0 / across, eigenvalue)
-    length, rate, critical = _lengths(structure, z, p, mode, eigenvalue)
+    lengths, rate, critical = _lengths(structure, z, p, mode, eigenvalue)
     stiffness = np.where(stiffness > 0.0, np.maximum(stiffness, np.abs(eigenvalue)), rate)
-    return SoftModes(eigenvalue, mode, stiffness, length, rate, critical)
+    return SoftModes(eigenvalue, mode, stiffness, *lengths, rate, critical)
 
 
 def metric_length(structure: Structure, du: Modes) -> Values:
@@ -116,8 +119,8 @@ def _response(structure: Structure, z: Lanes, p: Parameters, vector: Modes, shif
 
 def _lengths(
     structure: Structure, z: Lanes, p: Parameters, mode: Modes, eigenvalue: Values
-) -> tuple[Values, Values, Flags]:
-    """Lengths of modes, the size of eigenvalues there, and where the state is critical."""
+) -> tuple[tuple[Values, Values], Values, Flags]:
+    """Both lengths of modes, the size of eigenvalues there, and where the state is critical."""
     widest = WIDEST * extent_of_guesses(structure, p)
     size = np.abs(eigenvalue)
     third = np.abs(_third(structure, z, p, mode))
@@ -135,7 +138,8 @@ def _lengths(
     beyond = np.where(at_fold > SAME_STATE, at_fold, widest)  # by symmetry there is no third one
     rate = np.where(critical, (third + 0.5 * fourth * beyond) * beyond, size)
     # without any stiffness time is counted in units of one
-    return np.where(critical, beyond, length), np.where(rate > 0.0, rate, 1.0), critical
+    lengths = np.where(critical, beyond, length), length
+    return lengths, np.where(rate > 0.0, rate, 1.0), critical
 
 
 def _third(structure: Structure, z: Lanes, p: Parameters, mode: Modes) -> Values:

@@ -102,7 +102,7 @@ def _take_over(i, new_tangent, places, numbers, counts):
     """Make the end of an accepted step the place of the lane, and choose the next length."""
     z, tangent, trial, _ = places
     size, norm = trial.shape[1], 1.0 / numbers[NORM, i]
-    counts[HEAD, i] = (counts[HEAD, i] + 1) % MEMORY
+    counts[HEAD, i] = counts[HEAD, i] + 1 if counts[HEAD, i] < MEMORY - 1 else 0
     counts[KNOWN, i] = min(counts[KNOWN, i] + 1, MEMORY - 1)
     here = counts[HEAD, i]
     # loops over few arrays, so that the compiler can tell that they do not overlap
@@ -152,11 +152,13 @@ def predict(i, mass, places, numbers, counts):
     _look_back(i, mass, places, numbers, counts)
     numbers[LAST, i], counts[ITERATION, i] = np.inf, 0
     goal = 1.0 if numbers[SLOPE, i] > 0.0 else 0.0
-    ahead = _predicted(i, numbers[LENGTH, i], numbers, counts)
+    factors = _weights(i, numbers[LENGTH, i], numbers, counts)
+    ahead = _predicted(i, factors, numbers)
     aims = (ahead > goal) == (goal == 1.0)
     if aims:
         numbers[LENGTH, i] = _length_to(i, goal, numbers, counts)
-    _guess(i, places, numbers, counts)
+        factors = _weights(i, numbers[LENGTH, i], numbers, counts)
+    _guess(i, factors, places, counts)
     numbers[TRIAL, i], numbers[DEFECT, i] = ahead, 0.0
     numbers[CORNER, i] = numbers[WEIGHT, i] * numbers[SLOPE, i]
     counts[STAGE, i] = AIMING if aims else CORRECTING
@@ -186,7 +188,6 @@ def _look_back(i, mass, places, numbers, counts):
         then, along, rate = _before(i, back + 1, counts), 0.0, 0.0
         for j in range(n):
             along += row[i, j] * (z[i, then, j] - z[i, here, j])
-        for j in range(n):
             rate += row[i, j] * tangent[i, then, j]
         along += corner * (numbers[T_1 + 2 * back, i] - numbers[T, i])
         rate += corner * numbers[SLOPE_1 + 2 * back, i]
@@ -200,7 +201,8 @@ def _look_back(i, mass, places, numbers, counts):
 @njit(**SUMS)
 def _before(i, steps, counts):
     """Which of the remembered points of lane i was the present one so many steps ago."""
-    return (counts[HEAD, i] + MEMORY - min(steps, counts[KNOWN, i])) % MEMORY
+    then = counts[HEAD, i] - min(steps, counts[KNOWN, i])
+    return then if then >= 0 else then + MEMORY
 
 
 @njit(**SUMS)
@@ -230,9 +232,9 @@ def _weights(i, x, numbers, counts):
 
 
 @njit(**SUMS)
-def _predicted(i, length, numbers, counts):
+def _predicted(i, factors, numbers):
     """Predict t at the end of a step."""
-    one, two, here, slope_one, slope_two = _weights(i, length, numbers, counts)
+    one, two, here, slope_one, slope_two = factors
     t = numbers[T, i]
     back = one * (numbers[T_1, i] - t) + two * (numbers[T_2, i] - t)
     slopes = slope_one * numbers[SLOPE_1, i] + slope_two * numbers[SLOPE_2, i]
@@ -245,7 +247,8 @@ def _length_to(i, goal, numbers, counts):
     low, high = 0.0, numbers[LENGTH, i]
     for _ in range(50):
         length = 0.5 * (low + high)
-        if (_predicted(i, length, numbers, counts) > goal) == (goal == 1.0):
+        ahead = _predicted(i, _weights(i, length, numbers, counts), numbers)
+        if (ahead > goal) == (goal == 1.0):
             high = length
         else:
             low = length
@@ -253,17 +256,17 @@ def _length_to(i, goal, numbers, counts):
 
 
 @njit(**SUMS)
-def _guess(i, places, numbers, counts):
+def _guess(i, factors, places, counts):
     """Predict the point at the end of the step."""
     z, tangent, trial, _ = places
-    size = trial.shape[1]
     here, one, two = counts[HEAD, i], _before(i, 1, counts), _before(i, 2, counts)
-    a, b, c, d, e = _weights(i, numbers[LENGTH, i], numbers, counts)
+    a, b, c, d, e = factors
     rest = 1.0 - a - b
-    for j in range(size):
-        trial[i, j] = rest * z[i, here, j] + a * z[i, one, j] + b * z[i, two, j]
-    for j in range(size):
-        trial[i, j] += c * tangent[i, here, j] + d * tangent[i, one, j] + e * tangent[i, two, j]
+    for j in range(trial.shape[1]):
+        trial[i, j] = (
+            rest * z[i, here, j] + a * z[i, one, j] + b * z[i, two, j]
+            + (c * tangent[i, here, j] + d * tangent[i, one, j] + e * tangent[i, two, j])
+        )  # fmt: skip
 
 
 @njit(**SUMS)
