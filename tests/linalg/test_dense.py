@@ -4,9 +4,15 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from equimorph.linalg import negative_eigenvalues, orthonormal_rows, solve_bordered
+from equimorph.linalg import no_border, orthonormal_rows, solve_bordered
 from equimorph.linalg.kernels import solve_lanes
 from equimorph.linalg.simd import LANES, work_rows
+
+
+def negative_eigenvalues(matrices):
+    """Negative eigenvalues that the bordered solve counts."""
+    lanes, size = matrices.shape[:2]
+    return solve_bordered(matrices, *no_border(lanes, size), np.zeros((lanes, 0, size))).negative
 
 
 @settings(max_examples=60, deadline=None)
@@ -73,6 +79,24 @@ def test_small_systems_of_all_lanes_at_once_are_solved_with_row_exchanges(size):
     solve_lanes(rows, size, size + 2)
     found = rows.reshape(size, size + 2, LANES)[:, size:].transpose(2, 0, 1)
     np.testing.assert_allclose(found, np.linalg.solve(a, b), rtol=1e-11, atol=1e-12)
+
+
+@pytest.mark.parametrize("zeros", [False, True])
+def test_large_systems_have_the_solution_inertia_and_determinant_of_libraries(zeros):
+    """Oracle: LAPACK. 1e-9 of the right-hand side, 1e-8 of det: conditions of random matrices."""
+    generator = np.random.default_rng(2)
+    matrix = generator.normal(size=(3, 60, 60))
+    matrix += matrix.transpose(0, 2, 1)
+    if zeros:  # a saddle point with more unknowns than multipliers
+        matrix[:, 40:, 40:] = 0.0
+    columns, rows = generator.normal(size=(2, 3, 2, 60))
+    corner, rhs = generator.normal(size=(3, 2, 2)), generator.normal(size=(3, 4, 62))
+    found = solve_bordered(matrix, columns, rows, corner, rhs)
+    full = np.block([[matrix, columns.transpose(0, 2, 1)], [rows, corner]])
+    left = np.einsum("lij,lsj->lsi", full, found.x) - rhs
+    assert np.abs(left).max() < 1e-9
+    np.testing.assert_array_equal(found.negative, (np.linalg.eigvalsh(matrix) < 0).sum(axis=1))
+    np.testing.assert_allclose(found.determinant, np.linalg.det(matrix), rtol=1e-8)
 
 
 def test_one_singular_lane_is_not_a_number_and_leaves_the_others():

@@ -5,7 +5,6 @@ from equimorph.linalg.dense import (
     Border as Border,
     BorderedSolution as BorderedSolution,
     multiply as multiply,
-    negative_eigenvalues as negative_eigenvalues,
     no_border as no_border,
     orthonormal_rows as orthonormal_rows,
     solve_bordered as solve_bordered,

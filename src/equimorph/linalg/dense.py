@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from equimorph.arrays import Flags, Float, Lanes, Numbers, Values
-from equimorph.linalg.kernels import count_negative, multiply_lanes, orthonormal_lanes
+from equimorph.linalg.dense_kernels import solve_dense
+from equimorph.linalg.kernels import multiply_lanes, orthonormal_lanes
 
 Border = tuple[
     Float[np.ndarray, "lanes k size"],
@@ -62,21 +63,6 @@ def orthonormal_rows(
     return out
 
 
-def negative_eigenvalues(matrix: Float[np.ndarray, "lanes n n"]) -> Numbers:
-    """Count the negative eigenvalues of symmetric matrices.
-
-    LDLᵀ with complete pivoting [BunchParlett1971]_ and Sylvester's law of inertia. A matrix with
-    entries that are not finite, or become so, counts as −1.
-    """
-    out = np.full(len(matrix), -1, dtype=np.int64)
-    finite = np.isfinite(matrix)
-    if finite.all():
-        count_negative(np.ascontiguousarray(matrix), out)
-    elif (usable := finite.all(axis=(1, 2))).any():
-        out[usable] = negative_eigenvalues(matrix[usable])
-    return out
-
-
 def solve_bordered(
     matrix: Float[np.ndarray, "lanes n n"],
     columns: Float[np.ndarray, "lanes k n"],
@@ -85,6 +71,10 @@ def solve_bordered(
     rhs: Float[np.ndarray, "lanes sides bordered"],
 ) -> BorderedSolution:
     """Solve ``[A Cᵀ; R D] x = rhs`` per lane by LU with partial pivoting, with the inertia of A.
+
+    The inertia is that of LDLᵀ with rook pivoting [AshcraftGrimesLewis1998]_ within the bound of
+    [BunchParlett1971]_; −1 where entries are not finite, or become so. Libraries would hand more
+    than a hundred rows to threads that spin while they wait.
 
     Parameters
     ----------
@@ -99,49 +89,17 @@ def solve_bordered(
     -------
     Solutions; lanes whose bordered matrix is singular or not finite are filled with NaN.
     """
-    n, k = matrix.shape[1], columns.shape[1]
-    full = np.empty((len(matrix), n + k, n + k))
+    (lanes, n, _), k = matrix.shape, columns.shape[1]
+    full = np.empty((lanes, n + k, n + k + rhs.shape[1]))
     full[:, :n, :n] = matrix
-    full[:, :n, n:] = columns.transpose(0, 2, 1)
+    full[:, :n, n : n + k] = columns.transpose(0, 2, 1)
     full[:, n:, :n] = rows
-    full[:, n:, n:] = corner
-    x = _solve(full, rhs.transpose(0, 2, 1)).transpose(0, 2, 1)
-    ratio, pivoted = np.ones(len(matrix)), np.ones(len(matrix), bool)
-    x, negative = np.ascontiguousarray(x), negative_eigenvalues(matrix)
-    return BorderedSolution(x, negative, ratio, pivoted, _determinant(matrix))
-
-
-def _determinant(matrix: Float[np.ndarray, "lanes n n"]) -> Values:
-    with np.errstate(all="ignore"):
-        product = np.asarray(np.linalg.det(matrix))
-    if not np.isfinite(product).all():
-        product[~np.isfinite(product)] = np.nan
-    return product
-
-
-def _solve(
-    full: Float[np.ndarray, "lanes b b"], rhs: Float[np.ndarray, "lanes b sides"]
-) -> Float[np.ndarray, "lanes b sides"]:
-    every = np.isfinite(full).all() and np.isfinite(rhs).all()
-    usable = (
-        slice(None)
-        if every
-        else np.isfinite(full).all(axis=(1, 2)) & np.isfinite(rhs).all(axis=(1, 2))
-    )
-    x = np.full(rhs.shape, np.nan)
-    x[usable] = _solve_in_halves(full[usable], rhs[usable])
-    return x
-
-
-def _solve_in_halves(
-    full: Float[np.ndarray, "lanes b b"], rhs: Float[np.ndarray, "lanes b sides"]
-) -> Float[np.ndarray, "lanes b sides"]:
-    """Solutions, NaN in singular lanes: one of these fails its batch, which is halved then."""
-    try:
-        return np.asarray(np.linalg.solve(full, rhs))
-    except np.linalg.LinAlgError:
-        if len(full) == 1:
-            return np.full(rhs.shape, np.nan)
-    half = len(full) // 2
-    parts = [_solve_in_halves(full[part], rhs[part]) for part in (slice(half), slice(half, None))]
-    return np.concatenate(parts)
+    full[:, n:, n : n + k] = corner
+    full[:, :, n + k :] = rhs.transpose(0, 2, 1)
+    whole = np.isfinite(full[:, :n, :n]).all(axis=(1, 2))
+    x, determinant = np.empty(rhs.shape), np.empty(lanes)
+    negative = np.empty(lanes, dtype=np.int64)
+    solve_dense(full, n + k, np.array(matrix, order="C"), x, negative, determinant)
+    negative[~whole] = -1
+    determinant[~(whole & np.isfinite(determinant))] = np.nan
+    return BorderedSolution(x, negative, np.ones(lanes), np.ones(lanes, bool), determinant)
