@@ -54,6 +54,30 @@ def test_a_larger_error_is_kept(states, error):
     assert (np.abs(rough - states.margin) <= error * scale).all()
 
 
+def test_modes_are_those_of_the_smallest_eigenvalues(states):
+    """F_z (v, μ) = σ M v; margins are as exact as asked, modes as their root."""
+    structure, error = states.structure, 1e-6
+    some = states[np.flatnonzero(states.margin > 0.05)]
+    floor, few = np.full(len(some), 0.05), len(some)
+    found = margin.softest_modes(
+        structure, some.z, some.p, floor, margin.first_pairs(structure, few), error
+    )
+    assert found.above.all()
+    np.testing.assert_allclose(found.first, some.margin, rtol=error)
+    rhs = np.zeros_like(found.pairs[:, :1])
+    rhs[:, 0, : structure.unknowns] = found.pairs[:, 0, : structure.unknowns] * structure.mass
+    back = structure.solve(some.z, some.p, rhs).x[:, 0] * found.first[:, None]
+    scale = np.abs(found.pairs[:, 0]).max()
+    np.testing.assert_allclose(back, found.pairs[:, 0], rtol=0, atol=3e-3 * scale)
+
+
+def test_states_with_an_eigenvalue_below_the_floor_are_told(states):
+    floor = np.full(len(states), 0.2)
+    pairs = margin.first_pairs(states.structure, len(states))
+    found = margin.softest_modes(states.structure, states.z, states.p, floor, pairs, 1e-6)
+    np.testing.assert_array_equal(found.above, states.margin > 0.2)
+
+
 def test_margin_of_structures_with_few_unknowns():
     """A truss of two bars: two unknowns, no constraint; vectors of a pair may be parallel."""
     spring = em.Spring()

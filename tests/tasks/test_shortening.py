@@ -4,9 +4,12 @@ import numpy as np
 import pytest
 
 import equimorph as em
-from equimorph.structures import State, States
+from equimorph.manifold.queries.nearest import SetPoints
+from equimorph.structures import State, States, stability_margin
+from equimorph.tasks.optimising.tangent_steps import step_along, tangents_at
+from equimorph.tasks.planning.curves import CurveSteps, solve_block_tridiagonal
+from equimorph.tasks.planning.network import Demands, cheapest_path
 from equimorph.tasks.planning.objectives import length_through
-from equimorph.tasks.planning.shortening import solve_block_tridiagonal
 from oracles.spring_geodesics import shortest_length
 from sets import arch_set, spring_set
 from typecheck import unchecked
@@ -27,6 +30,8 @@ ARCH = [
     ((0.92250796, -0.74780856), (1.94631755, 0.38795092)),
 ]
 """Ends whose routes differed by .7 to 3.3 %: the first had two ways of .4 % over the mesh."""
+CAPPED = ((1.01745169, 0.07639395), (0.54744324, 1.73367757))
+"""Ends whose path over the mesh leads over vertices on the constraint."""
 
 
 @pytest.mark.parametrize("d", [1, 2, 3])
@@ -97,6 +102,51 @@ def test_routes_of_the_arch_are_the_same_in_the_mirror(ends):
     there, back, image = costs(arch_set(), ends)
     assert back == pytest.approx(there, rel=2e-4)
     assert image == pytest.approx(there, rel=ACCURACY)
+
+
+def test_a_path_over_vertices_on_a_constraint_is_shortened():
+    """Nodes on walls could not move: the route was 9 % longer than in the mirror."""
+    there, _, image = costs(arch_set(), CAPPED)
+    assert image == pytest.approx(there, rel=ACCURACY)
+
+
+def test_slopes_of_walls_are_those_of_their_distances():
+    """Central differences of exact margins and of what bounds leave, step 1e-4."""
+    eset = arch_set()
+    ends = [stable_near(eset, place) for place in ARCH[1]]
+    demands = Demands.of(eset.structure, "length", eset.constraints, 0.0)
+    steps = CurveSteps(eset, demands)
+    curve = steps.curve(cheapest_path(eset, ends, demands))
+    assert curve is not None
+    inner = curve.take(curve.inner)
+    frames, at = tangents_at(steps.setting, SetPoints(inner.z, inner.p, inner.rows))
+    slopes = steps._slopes(inner, frames)
+    for k in range(2):
+        along, sides = np.zeros((len(inner.z), 2)), []
+        for along[:, k] in (1e-4, -1e-4):
+            z, p = step_along(steps.setting, at, frames, along)
+            margin = stability_margin(eset.structure, z, p)
+            excess = eset.constraints[0].excess(z, p)
+            place = p[:, steps.setting.free] / steps.setting.scales
+            sides.append(np.column_stack([margin, -excess, place, -place]))
+        wanted = (sides[0] - sides[1]) / 2e-4
+        scale = np.maximum(np.abs(wanted).max(axis=0), 1.0)
+        np.testing.assert_allclose(slopes[:, :, k] / scale, wanted / scale, rtol=0, atol=0.03)
+
+
+@pytest.mark.parametrize("grid", [(24, 41), pytest.param((33, 49), marks=pytest.mark.slow)])
+def test_routes_that_keep_a_margin_do_not_depend_on_the_grid(grid):
+    """2.148 and 2.172 when straight lifts that lost margin had the whole route keep more of it."""
+    found = []
+    for eset in (arch_set((12, 21)), arch_set(grid)):
+        here = eset.at(Theta=1.0, Delta=0.0).stable
+        height = eset.structure.height(0.5)
+        up, down = max(here, key=height), min(here, key=height)
+        with unchecked():
+            found += [em.plan(eset, *ends, margin=0.3) for ends in ((up, down), (down, up))]
+    cost = [route.cost for route in found]
+    np.testing.assert_allclose(cost, cost[0], rtol=ACCURACY)
+    assert all(0.3 <= route.margin < 0.304 for route in found)
 
 
 @pytest.mark.slow

@@ -3,6 +3,7 @@
 See docs/decisions.md, "The metric is diagonal".
 """
 
+from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
 from typing import Any, Protocol, runtime_checkable
@@ -10,6 +11,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 
 from equimorph.arrays import Flags, Float, Lanes, Parameters, Sides, Values
+from equimorph.columns import Columns
 from equimorph.linalg import BorderedSolution
 from equimorph.linalg.lanes import in_background, threads
 from equimorph.structures.equations import Shift
@@ -25,7 +27,7 @@ FIRST_HALVINGS, POLISHING, ALL_HALVINGS = 12, 40, 60
 SWEEPS, CHUNK, SHARE = 8, 256, 1024
 """Most solves; lanes at a time; least lanes that are worth a further thread."""
 
-Pairs = Float[np.ndarray, "lanes 2 unknowns"]
+Pairs = Float[np.ndarray, "lanes 2 size"]
 
 
 @runtime_checkable
@@ -100,10 +102,11 @@ def _by_pairs(
 ) -> tuple[Values, Flags]:
     """Margins of states without eigenvalues below `start`, and which of them are proved."""
     value, proved = np.empty(len(z)), np.zeros(len(z), bool)
-    todo, vectors = np.arange(len(z)), np.tile(_first_pair(structure), (len(z), 1, 1))
+    todo, vectors = np.arange(len(z)), first_pairs(structure, len(z))
     shift, known = start.copy(), np.full(len(z), np.nan)
     for sweep in range(SWEEPS):
-        vectors, first, second, stable = _swept(structure, z[todo], p[todo], shift, vectors)
+        swept = _swept(structure, z[todo], p[todo], shift, vectors)
+        vectors, first, second, stable = swept.pairs, swept.first, swept.second, swept.above
         change = np.abs(known - first)
         # one more sweep would shrink the error by this factor
         left = ((first - shift) / np.maximum(second - shift, NEAR * np.abs(second))) ** 2
@@ -139,12 +142,58 @@ def _above(
     return value, proved
 
 
-def _first_pair(structure: Pencil) -> Float[np.ndarray, "2 unknowns"]:
-    """Vectors that are smooth along a chain, and orthogonal to no mode."""
+def first_pairs(structure: Pencil, lanes: int) -> Pairs:
+    """Vectors that are smooth along a chain, and orthogonal to no mode, for each lane."""
     n = structure.unknowns
     at, count = np.arange(n), np.array([[2.0], [3.0]])
     pair = np.sin(np.pi * count * (at + 1) / (n + 1)) + 0.1 * np.cos((count - 0.7) * at)
-    return np.asarray(pair / np.sqrt(pair**2 @ structure.mass)[:, None])
+    pairs = np.zeros((lanes, 2, structure.size))
+    pairs[:, :, :n] = pair / np.sqrt(pair**2 @ structure.mass)[:, None]
+    return pairs
+
+
+@dataclass(frozen=True)
+class Softest(Columns):
+    """Rayleigh quotients of pairs of vectors.
+
+    Parameters
+    ----------
+    pairs
+        Vectors (v, μ), orthonormal in the metric; of these the first is the mode.
+    first
+        Rayleigh quotient of the first.
+    second
+        Ritz value of the second.
+    above
+        Whether no eigenvalue lies below the shift.
+    off
+        Square of the residual of the mode, in the inverse of the metric.
+    """
+
+    pairs: Pairs
+    first: Values
+    second: Values
+    above: Flags
+    off: Values
+
+
+def softest_modes(
+    structure: Pencil, z: Lanes, p: Parameters, floor: Values, pairs: Pairs, error: float
+) -> Softest:
+    """Margins of states without an eigenvalue below `floor`, and their modes, from given pairs.
+
+    Modes of states nearby take one solve. `error` is relative to the distance from `floor`; the
+    bound of Kato and Temple estimates it: the square of the residual over the gap.
+    """
+    found = _swept(structure, z, p, floor, pairs)
+    for _ in range(SWEEPS - 1):
+        allowed = error * (found.first - floor) * (found.second - found.first)
+        more = np.flatnonzero(found.above & (found.off > allowed))
+        if len(more) == 0:
+            break
+        again = _swept(structure, z[more], p[more], floor[more], found.pairs[more])
+        found = found.with_rows(more, again)
+    return found
 
 
 def _swept(
@@ -153,15 +202,11 @@ def _swept(
     p: Parameters,
     shift: Values,
     vectors: Pairs,
-) -> tuple[Pairs, Values, Values, Flags]:
-    """One solve for pairs of vectors, and their rotation to Ritz vectors.
-
-    Returns the next pairs, orthonormal; the Rayleigh quotient of the first; the Ritz value of the
-    second; and whether no eigenvalue lies below the shift.
-    """
+) -> Softest:
+    """One solve for pairs of vectors, and their rotation to Ritz vectors."""
     n, mass = structure.unknowns, structure.mass
     rhs = np.zeros((len(shift), 2, structure.size))
-    np.multiply(vectors, mass, out=rhs[:, :, :n])
+    np.multiply(vectors[:, :, :n], mass, out=rhs[:, :, :n])
     solution = structure.solve(z, p, rhs, shift=shift)
     solved = solution.x[:, :, :n]
     with np.errstate(all="ignore"):  # a singular solve is not good
@@ -180,12 +225,16 @@ def _swept(
         two = 1.0 / np.sqrt(np.maximum(low - part * cross, 1e-14 * top))
         mix = np.stack([cos * one, sin * one, -(sin + part * cos) * two, (cos - part * sin) * two])
         # K y = M x: the Rayleigh quotient of y needs no product with K
-        first = shift + (mean + half) / top
+        above = (mean + half) / top
+        first = shift + above
+        # a single vector is the mode itself
+        alone = n - structure.constraints < 2
+        off = np.zeros(len(shift)) if alone else np.maximum(1.0 / top - above**2, 0.0)
         second = shift + 1.0 / np.maximum(mean - half, NEAR * (mean + half))
         good = (solution.negative == structure.constraints) & np.isfinite(first + second)
         first, second = (np.where(good, each, 1.0) for each in (first, second))
-        pair = np.einsum("abl,lbi->lai", mix.reshape(2, 2, -1), solved)
-    return pair, first, second, np.asarray(good)
+        pairs = np.einsum("abl,lbi->lai", mix.reshape(2, 2, -1), solution.x)
+    return Softest(pairs, first, second, np.asarray(good), off)
 
 
 def _products(left: Pairs, right: Pairs) -> tuple[Values, Values, Values]:

@@ -68,14 +68,18 @@ class BaseMesh:
 
     def locate(self, point: Place) -> int:
         """Cell that contains a point; the nearest one by barycentric coordinates."""
-        corners = self.vertices[self.cells]
-        low, high = corners[:, 0], corners[:, 0]
-        for k in range(1, corners.shape[1]):
-            low, high = np.minimum(low, corners[:, k]), np.maximum(high, corners[:, k])
+        low, high = self._bounds
         near = np.flatnonzero(((low <= point) & (point <= high)).all(axis=1))
         if len(near) == 0:  # a little outside the box
-            near = np.arange(len(corners))
-        return int(near[np.argmax(barycentric(corners[near], point).min(axis=1))])
+            near = np.arange(len(self.cells))
+        corners = self.vertices[self.cells[near]]
+        return int(near[np.argmax(barycentric(corners, point).min(axis=1))])
+
+    @cached_property
+    def _bounds(self) -> tuple[Float[np.ndarray, "C d"], Float[np.ndarray, "C d"]]:
+        """Smallest boxes around the cells."""
+        corners = self.vertices[self.cells]
+        return corners.min(axis=1), corners.max(axis=1)
 
 
 def mesh_of(vertices: Float[np.ndarray, "V d"], cells: Cells) -> BaseMesh:

@@ -9,7 +9,7 @@ from equimorph.equilibria import Guards, settle
 from equimorph.model import Box
 from equimorph.structures import States, join_states
 from equimorph.tasks.planning.network import Demands, connect
-from equimorph.tasks.planning.objectives import Places
+from equimorph.tasks.planning.objectives import Places, arc_lengths
 
 Some = Int[np.ndarray, " n"]
 
@@ -77,9 +77,9 @@ def move_by_lifts(corners: States, demands: Demands, room: ActuatorBox, quick: b
 def chords(
     corners: States, first: Some, second: Some, demands: Demands
 ) -> tuple[Bool[np.ndarray, " n"], Values]:
-    """Whether chords between given corners seem admissible, and their costs."""
+    """Whether chords between corners seem admissible, and their costs; lengths are of arcs."""
     places = demands.objective.places(corners)
-    return _chords(places[first], places[second], demands)
+    return _chords(places[first], places[second], demands, arcs=demands.objective.is_length)
 
 
 def _move_corners(
@@ -106,7 +106,7 @@ def _move_corners(
 
 
 def _chords(
-    first: Places, second: Places, demands: Demands
+    first: Places, second: Places, demands: Demands, *, arcs: bool = False
 ) -> tuple[Bool[np.ndarray, " n"], Values]:
     """Whether the states halfway between pairs are admissible, and the cost through them."""
     a, b = first.states, second.states
@@ -117,7 +117,10 @@ def _chords(
     amid = States(a.structure, z[some], p[some])
     middle, between = demands.objective.places(amid), demands.objective.between
     cost = np.full(len(p), np.nan)
-    cost[some] = between(first[some], middle) + between(middle, second[some])
+    halves = between(first[some], middle), between(middle, second[some])
+    cost[some] = halves[0] + halves[1]
+    if arcs:
+        cost[some] = arc_lengths(*halves, between(first[some], second[some]))
     none = np.flatnonzero(~good)
     cost[none] = between(first[none], second[none])
     good[some] = demands.admissible(amid)

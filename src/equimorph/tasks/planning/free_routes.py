@@ -90,7 +90,7 @@ def route_with_reserve(
     path = _path(eset, ends, tightened, passing)
     if path is None:
         return None
-    corners = straight_corners(eset, path, tightened)
+    (corners,) = straight_corners(eset, [path], tightened)
     return route_over_corners(eset, follow_direction(corners, ends), demands, monitor)
 
 
@@ -127,8 +127,8 @@ def _best_path(eset: EquilibriumSet, ends: Ends, demands: Demands) -> States | N
     paths = list(islice(cheap_paths(eset, ends, demands), MOST_PATHS))
     if len(paths) < 2:
         return paths[0] if paths else None
-    shortener = Shortener(eset, demands)
-    return min(paths, key=shortener.rough_length)
+    lengths = Shortener(eset, demands).rough_lengths(paths)
+    return paths[int(np.argmin(lengths))]
 
 
 def _link_over(passing: Passing, demands: Demands) -> States | None:

@@ -2,6 +2,7 @@
 
 from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.sparse import coo_array
@@ -30,6 +31,8 @@ BROAD = 0.1
 MATCH = 1e-5
 """Distance in the metric within which a lift leads to the state that is meant."""
 
+SEARCHED = replace(FINE, retries=0)
+"""Step control of lifts as fine as the final ones, where one that fails is one of many."""
 DETOUR, APART = 0.1, 0.15
 """Part by which another path over the mesh may be longer, and its distance in such parts."""
 
@@ -69,10 +72,12 @@ class Demands:
     def with_reserves(self, least: float) -> Iterator["Demands"]:
         """Demands with growing reserves of margin, for dips between the points that are watched.
 
-        What leaves no room for a reserve is searched without one, too; without a demanded margin
-        that comes first. No reserve exceeds `least`, the smaller margin of start and goal.
+        What leaves no room for a reserve is searched without one, too; without a demanded margin,
+        and where shortest curves keep what they need, that comes first. No reserve exceeds `least`,
+        the smaller margin of start and goal.
         """
-        for factor, share in (*RESERVES, EXACT) if self.margin > 0.0 else (EXACT, *RESERVES):
+        dips = self.margin > 0.0 and not self.objective.is_length
+        for factor, share in (*RESERVES, EXACT) if dips else (EXACT, *RESERVES):
             yield replace(self, margin=min(self.margin * factor + least * share, least))
 
     def beyond(self, eset: EquilibriumSet) -> tuple[Constraint, ...]:
@@ -84,7 +89,7 @@ class Demands:
     def options(self) -> TraceOptions:
         """Step control of the lifts."""
         if self.closely:
-            return FINE
+            return SEARCHED
         if self.margin > 0.0:
             return TraceOptions(largest_step=CLOSE)
         step = 0.5 if self.objective.is_length else BROAD
@@ -197,6 +202,10 @@ class Network:
         self.stable, self.cells = stable, cells
         pairs = faces_of(cells, 2)
         self.pairs = pairs[stable[pairs].all(axis=1)]
+        code = np.array([len(eset.points), 1])
+        keys = np.sort(self.pairs, axis=1) @ code
+        self._order = np.argsort(keys)
+        self._code, self._keys = code, keys[self._order]
         self._allowed: dict[tuple[tuple[Constraint, ...], float], Flags] = {}
         self._broken: dict[tuple[tuple[Constraint, ...], float, bool], Flags] = {}
         self._lifted: dict[tuple[tuple[Constraint, ...], float, bool], Flags] = {}
@@ -228,6 +237,14 @@ class Network:
         for known in (self._broken, self._lifted):
             known.setdefault(key, np.zeros(len(self.pairs), bool))
         return self._broken[key], self._lifted[key]
+
+    def links_of(self, paths: Sequence[Int[np.ndarray, " n"]]) -> Some:
+        """Links that paths lead over, but for those of start and goal."""
+        steps = [np.sort(np.stack([path[:-1], path[1:]], axis=1), axis=1) for path in paths]
+        joined = np.concatenate([np.zeros((0, 2), int), *steps])
+        keys = np.unique(joined[joined[:, 1] < self._code[0]] @ self._code)
+        at = np.minimum(np.searchsorted(self._keys, keys), len(self._keys) - 1)
+        return self._order[at[self._keys[at] == keys]] if len(self._keys) else at[:0]
 
     def lift_links(self, used: Some, states: States, demands: Demands) -> bool:
         """Lift those of the used links that were not lifted before; whether all lead on.
@@ -268,24 +285,21 @@ def cheap_paths(eset: EquilibriumSet, ends: Ends, demands: Demands) -> Iterator[
     broken, _ = network.verdicts(demands)
     costs = network.costs(eset, demands.objective)
     states, (own, own_costs) = nodes_with_ends(eset, ends), end_links(eset, ends, demands)
-    count = len(states)
-    place, far = metric_places(states), np.ones(count, bool)
-    trees, best = None, np.inf
+    before, trees, best = list[States](), None, np.inf
     while True:
-        inner = np.flatnonzero(allowed & ~broken)
         if trees is None:
+            inner = np.flatnonzero(allowed & ~broken)
             pairs = np.concatenate([network.pairs[inner], own])
-            trees = _Trees.of(count, pairs, np.concatenate([costs[inner], own_costs]))
-        over = np.where(far, trees.over, np.inf)
-        middle = int(over.argmin())
-        if not np.isfinite(over[middle]) or over[middle] > (1.0 + DETOUR) * best:
+            trees = _Trees.of(len(states), pairs, np.concatenate([costs[inner], own_costs]))
+        middle = trees.cheapest(states, before, best)
+        if middle is None:
             return
         path = trees.path(middle)
-        if not network.lift_links(inner[on_paths(network.pairs[inner], [path])], states, demands):
+        if not network.lift_links(network.links_of([path]), states, demands):
             trees = None
             continue
-        best = min(best, over[middle])
-        far &= cKDTree(place[path]).query(place)[0] > APART * best
+        best = min(best, trees.over[middle])
+        before.append(states[path])
         yield states[path]
 
 
@@ -303,10 +317,20 @@ class _Trees:
         ends = [count - 2, count - 1]
         return cls(*dijkstra(graph, directed=False, indices=ends, return_predecessors=True))
 
-    @property
+    @cached_property
     def over(self) -> Values:
         """Costs of the cheapest paths over each node."""
         return np.asarray(self.cost.sum(axis=0))
+
+    def cheapest(self, states: States, before: list[States], best: float) -> int | None:
+        """Node with the cheapest path over it, of those that lie apart from given paths."""
+        near = np.flatnonzero(self.over <= (1.0 + DETOUR) * best)
+        near = near[np.isfinite(self.over[near])]
+        place = metric_places(states[near]) if before else np.zeros((len(near), 0))
+        for path in before:
+            apart = cKDTree(metric_places(path)).query(place)[0] > APART * best
+            near, place = near[apart], place[apart]
+        return int(near[self.over[near].argmin()]) if len(near) else None
 
     def path(self, middle: int) -> Int[np.ndarray, " n"]:
         """Cheapest path over a node."""
@@ -368,10 +392,12 @@ def neighbours(
 
 def vertices_around(eset: EquilibriumSet, state: State) -> Flags:
     """Which vertices lie over the grid cell of a state and those around it."""
-    cells = eset.mesh.cells
-    own = eset.mesh.locate(np.array([state[name] for name in eset.names]))
-    around = np.unique(cells[np.isin(cells, cells[own]).any(axis=1)])
-    return np.asarray(np.isin(eset.grid_vertex, around))
+    cells, over = eset.mesh.cells, eset.grid_vertex
+    count = 1 + max(int(cells.max()), int(over.max()))
+    corners, around = np.zeros(count, bool), np.zeros(count, bool)
+    corners[cells[eset.mesh.locate(np.array([state[name] for name in eset.names]))]] = True
+    around[cells[corners[cells].any(axis=1)]] = True
+    return np.asarray((over >= 0) & around[over])
 
 
 def explain_no_route(eset: EquilibriumSet, ends: Ends, demands: Demands) -> str:

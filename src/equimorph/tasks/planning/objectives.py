@@ -143,10 +143,7 @@ class Objective:
 def length_through(states: States) -> float:
     """Length in the metric of the way through states in turn, to fourth order in the steps.
 
-    The arc through two states and the one at the mean of their parameters, with chords a and b to
-    it and c between them, has the length ``a + b + (a + b − c) (a² − ab + b²)/(3ab)`` up to the
-    fifth order: the curvature follows from what both chords together are longer. Each step is two
-    such arcs.
+    Each step is two arcs; see `arc_lengths`.
     """
     moved = np.flatnonzero(_chords(states[:-1], states[1:]) > 0.0)
     first, last = states[:-1][moved], states[1:][moved]
@@ -155,11 +152,22 @@ def length_through(states: States) -> float:
     return float(np.where(good, arc, _chords(first, last)).sum())
 
 
+def arc_lengths(first: Values, second: Values, chord: Values) -> Values:
+    """Lengths of arcs with two chords a and b in turn, and a chord c over both.
+
+    ``a + b + (a + b − c) (a² − ab + b²)/(3ab)`` up to the fifth order: the curvature follows from
+    what both chords together are longer.
+    """
+    a, b = first, second
+    share = (a**2 - a * b + b**2) / np.maximum(3.0 * a * b, 1e-300)
+    return np.asarray(a + b + (a + b - chord) * share)
+
+
 def _arcs(first: States, last: States) -> Values:
     """Lengths of arcs between pairs of states; their chords where no state is between them."""
     middle, good = _between(first, last)
-    a, b, chord = _chords(first, middle), _chords(middle, last), _chords(first, last)
-    arc = a + b + (a + b - chord) * (a**2 - a * b + b**2) / np.maximum(3.0 * a * b, 1e-300)
+    chord = _chords(first, last)
+    arc = arc_lengths(_chords(first, middle), _chords(middle, last), chord)
     return np.where(good, arc, chord)
 
 

@@ -15,6 +15,7 @@ from scipy.sparse.csgraph import breadth_first_order, minimum_spanning_tree
 from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Bool, Edges, Float, Int
 from equimorph.manifold import EquilibriumSet
+from equimorph.manifold.complex.kept_tables import from_cache
 from equimorph.model import Constraint, Descriptor
 from equimorph.structures import State, States
 from equimorph.tasks.planning.kernels import search_classes
@@ -25,7 +26,6 @@ from equimorph.tasks.planning.network import (
     explain_no_route,
     network_of,
     nodes_with_ends,
-    on_paths,
 )
 from equimorph.tasks.planning.objectives import Wish
 from equimorph.tasks.planning.straightening import (
@@ -100,7 +100,7 @@ def alternatives(
     best, failed = list[Route](), list[Route]()
     for tightened in demands.with_reserves(min(end.margin for end in ends)):
         paths = _Classes(eset, order_ends(ends), tightened).paths(count)
-        corners = [straight_corners(eset, path, tightened, same_class=True) for path in paths]
+        corners = straight_corners(eset, paths, tightened, same_class=True)
         routes = [
             route_over_corners(eset, follow_direction(each, ends), demands, monitor)
             for each in corners
@@ -134,8 +134,13 @@ class _Classes:
         self.network, (self.broken, _) = network, network.verdicts(demands)
         self.inner = np.flatnonzero(allowed[network.pairs].all(axis=1))
         pairs = np.sort(network.pairs[self.inner], axis=1)
-        triangles = np.sort(network.cells[allowed[network.cells].all(axis=1)], axis=1)
-        values = cocycles(len(eset.points), pairs, triangles)
+
+        def values_of() -> Values:
+            triangles = np.sort(network.cells[allowed[network.cells].all(axis=1)], axis=1)
+            return cocycles(len(eset.points), pairs, triangles)
+
+        key = "cocycles", demands.constraints, demands.margin
+        values = from_cache(eset, key, values_of)
         own, own_costs = end_links(eset, ends, demands)
         own_values = _own_values(own, pairs, values, len(eset.points))
         self.graph = _Graph(
@@ -146,10 +151,9 @@ class _Classes:
 
     def paths(self, count: int) -> list[States]:
         """States along the best paths of up to `count` classes; all their links can be lifted."""
-        pairs = self.network.pairs[self.inner]
         while True:
             paths = self._search(count)
-            used = self.inner[on_paths(pairs, paths)]
+            used = self.network.links_of(paths)
             if self.network.lift_links(used, self.states, self.demands):
                 return [self.states[path] for path in paths]
 

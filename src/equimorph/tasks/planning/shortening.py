@@ -1,4 +1,4 @@
-"""Shortest curves on a set between two states, away from walls: a geodesic by Newton's method.
+"""Shortest curves on a set between two states, away from walls: geodesics by Newton's method.
 
 The nodes X_k of a curve on the set move along its tangent spaces, so that folds are no obstacle.
 Sought is the least of
@@ -7,67 +7,52 @@ Sought is the least of
 
 whose first sum is the squared length of a curve that runs through its share w_k of the length from
 node to node. The walls g_j > 0 are the stability margin above what is demanded, the constraints,
-and the sides of the box.
+and the sides of the box. Where a margin is demanded, nodes keep as much more of it as straight
+lifts from node to node lose between them.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
-from scipy.linalg import solveh_banded
 
-from equimorph.arrays import Float, Frames, Some, Values
+from equimorph.arrays import Flags, Some, Values
+from equimorph.equilibria import settle
 from equimorph.manifold import EquilibriumSet
-from equimorph.manifold.geometry.setting import Setting, embed
-from equimorph.manifold.queries.nearest import SetPoints
-from equimorph.structures import States, stability_margin
-from equimorph.tasks.optimising.tangent_steps import (
-    project_onto_set,
-    step_along,
-    tangent_planes,
-    tangents_at,
-    unconstrained_setting,
+from equimorph.manifold.geometry.setting import embed
+from equimorph.structures import States
+from equimorph.structures.margin import softest_modes
+from equimorph.tasks.planning.curves import (
+    Curves,
+    CurveSteps,
+    join_curves,
+    split_curves,
 )
 from equimorph.tasks.planning.network import Demands, connect, lift_straight
+from equimorph.tasks.planning.objectives import Objective
 
-NUDGE = 1e-4
-"""Step along the tangents of the differences of walls, in the metric."""
-MARGIN_ERROR = 1e-6
-"""Relative error of margins, whose differences are taken."""
-HELD = 0.2
-"""Share of its distance to a wall that a node keeps in one step, by the slope of the wall."""
-REACH = 0.3
-"""Longest step of a node, in the metric."""
 STEPS, HALVINGS = 12, 5
 """Newton steps for one strength of the walls, and halvings of each."""
-ENOUGH = 1e-4
-"""Share of the squared length that the last step gains."""
+ENOUGH, NEARLY = 1e-4, 1e-2
+"""Share of the squared length that the last step gains: of all, and before walls are weaker."""
 
-FEW, NODES, MOST_NODES = 20, 48, 128
+FEW, NODES, MOST_NODES = 20, 48, 192
 """Nodes of a rough curve, of a fine one, and most after legs that cannot be lifted were divided."""
-STRENGTHS = (0.2, 0.06, 0.02, 0.01)
+STRENGTHS = (0.1, 0.03, 0.01)
 """Strengths of the walls, one after the other: curves bend along a wall at half of it times the
 radius of their bend."""
-DIVISIONS = 5
-"""How often legs are divided until straight lifts follow them."""
-INWARD = 1e-3
-"""Share of the box by which nodes on its sides are moved inside."""
-
-Walls = Float[np.ndarray, "nodes walls"]
-Steps = Float[np.ndarray, "nodes d"]
-
-
-@dataclass(frozen=True)
-class Curve:
-    """Nodes on a set, their distances from walls, and the shares of the legs between them."""
-
-    at: SetPoints
-    walls: Walls
-    shares: Values
+DIVISIONS, LONGER = 5, 1e-4
+"""How often legs are divided until straight lifts follow them, and the share of the length by which
+these may be longer."""
+LOSSES, TAKEN, ROUGHLY = 3.0, 0.8, 1e-2
+"""Margins above what is demanded, in losses on legs, up to which these count; the largest share of
+what is free that is kept for them; and the relative error of losses."""
 
 
 @dataclass(frozen=True)
 class Shortener:
-    """Search for the shortest curve within demands.
+    """Search for the shortest curves within demands.
 
     Parameters
     ----------
@@ -81,230 +66,171 @@ class Shortener:
     demands: Demands
 
     @property
-    def _setting(self) -> Setting:
-        return unconstrained_setting(self.eset)
+    def _closely(self) -> Demands:
+        """Lengths of lifts as fine as the final ones."""
+        return replace(self.demands, objective=Objective(((1.0, "length"),)), closely=True)
 
-    def curve(self, nodes: States) -> Curve:
-        """Curve through given stable states, with equal shares."""
-        rows = tangent_planes(self._setting, nodes)
-        at = SetPoints(nodes.z, nodes.p, rows)
-        return Curve(at, self._walls(at), np.full(len(nodes) - 1, 1.0 / (len(nodes) - 1)))
+    @cached_property
+    def _steps(self) -> CurveSteps:
+        return CurveSteps(self.eset, self.demands)
 
-    def curve_near(self, path: States) -> Curve | None:
-        """Shortest curve near a path, by straight lifts from node to node; None if none is found.
+    def curves_near(self, paths: Sequence[States]) -> list[States | None]:
+        """Nodes of shortest curves near paths, by straight lifts from one to the next.
 
-        Walls become weaker as long as all legs can be lifted.
+        Walls are as weak as lifts of all legs allow; None where they never do.
         """
-        curve, found = self._curve_along(path, NODES), list[Curve]()
-        if curve is None:
-            return None
-        for strength in STRENGTHS:
-            # farther from walls there is more room for further nodes
-            tried = (self._linked(each, strength) for each in [*found[:-3:-1], curve])
-            linked = next((each for each in tried if each is not None), None)
-            if linked is None:
-                break
-            found.append(linked)
-        return found[-1] if found else None
+        starts = [self._curve_along(path, NODES) for path in paths]
+        found: list[Curves | None] = [None] * len(paths)
+        for last in range(len(STRENGTHS), 0, -1):
+            todo = {
+                k: start for k, start in enumerate(starts) if start is not None and found[k] is None
+            }
+            linked = self._linked(list(todo.values()), STRENGTHS[:last]) if todo else []
+            for k, curve in zip(todo, linked, strict=True):
+                found[k] = curve
+        return [None if curve is None else self._steps.states(curve) for curve in found]
 
-    def rough_length(self, path: States) -> float:
-        """Length of a shortened curve of few nodes near a path; infinite without one."""
-        curve = self._curve_along(path, FEW)
-        if curve is None:
-            return np.inf
-        for strength in STRENGTHS:
-            curve = self.shorten(curve, strength)
-        return float(np.linalg.norm(np.diff(self._place(curve), axis=0), axis=1).sum())
+    def rough_lengths(self, paths: Sequence[States]) -> list[float]:
+        """Lengths of shortened curves of few nodes near paths; infinite without one."""
+        curves, lengths = [self._curve_along(path, FEW) for path in paths], [np.inf] * len(paths)
+        some = [k for k, curve in enumerate(curves) if curve is not None]
+        shorter = self._shorten([curves[k] for k in some], STRENGTHS) if some else []
+        for k, curve in zip(some, shorter, strict=True):
+            lengths[k] = float(self._gaps(self._steps.states(curve)).sum())
+        return lengths
 
-    def _curve_along(self, path: States, count: int) -> Curve | None:
+    def _curve_along(self, path: States, count: int) -> Curves | None:
         """Curve along a path, of about so many nodes; None if one of them meets a wall."""
         nodes = self._nodes(path, count)
-        curve = None if nodes is None else self.curve(nodes)
-        return curve if curve is not None and (curve.walls[1:-1] > 0.0).all() else None
+        return None if nodes is None else self._steps.curve(nodes)
 
     def _nodes(self, path: States, count: int) -> States | None:
-        """States along a path, about as many as a curve has, inside the box."""
-        some = np.unique(np.linspace(0, len(path) - 1, min(len(path), count)).round().astype(int))
-        path = path[some]
-        setting = self._setting
-        place = embed(setting, path.z, path.p)
-        gap = np.linalg.norm(np.diff(place, axis=0), axis=1)
-        parts = np.maximum(1, (count * gap / max(gap.sum(), 1e-300)).round()).astype(int)
+        """States along a path, about as many as given; None if lifts fail.
+
+        Between states that are farther apart there are those of straight lifts.
+        """
+        gap = self._gaps(path)
+        parts = np.maximum(1, np.ceil(0.7 * count * gap / max(gap.sum(), 1e-300))).astype(int)
         leg = np.repeat(np.arange(len(parts)), parts)
-        share = np.concatenate([np.arange(1, each + 1) / each for each in parts])[:, None]
-        p = path.p[leg] + share * (path.p[leg + 1] - path.p[leg])
-        box, inset = self.eset.box, INWARD * np.ptp([self.eset.box.lower, self.eset.box.upper], 0)
-        inside = p.copy()
-        inside[:-1, setting.free] = np.clip(
-            p[:-1, setting.free], box.lower + inset, box.upper - inset
-        )
-        z, there, _ = lift_straight(path[leg], inside, Demands(self.demands.objective))
-        z[-1] = path.z[-1]
+        share = np.concatenate([np.arange(1, each + 1) / each for each in parts])
+        start, share = np.where(share == 1.0, leg + 1, leg), np.where(share == 1.0, 0.0, share)
+        p = path.p[start] + share[:, None] * (path.p[leg + 1] - path.p[start])
+        z, there, _ = lift_straight(path[start], p, Demands(self.demands.objective))
         if not there.all():
             return None
-        return States(
-            path.structure,
-            np.concatenate([path.z[:1], z]),
-            np.concatenate([path.p[:1], inside]),
-        )
+        z, p = np.concatenate([path.z[:1], z]), np.concatenate([path.p[:1], p])
+        nodes = States(path.structure, z, p)
+        at = np.concatenate([[0.0], np.cumsum(self._gaps(nodes))])
+        even = np.linspace(0.0, at[-1], count + 1)
+        return nodes[np.unique(np.abs(at[:, None] - even).argmin(axis=0))]
 
-    def _linked(self, curve: Curve, strength: float) -> Curve | None:
-        """Shortened curve all of whose legs can be lifted; None if none was found.
+    def _gaps(self, states: States) -> Values:
+        place = embed(self._steps.setting, states.z, states.p)
+        return np.asarray(np.linalg.norm(np.diff(place, axis=0), axis=1))
 
-        Legs that cannot are divided before, where the curve is farther from walls.
+    def _linked(self, curves: list[Curves], strengths: tuple[float, ...]) -> list[Curves | None]:
+        """Shortened curves all of whose legs can be lifted; None where none was found.
+
+        Legs that cannot, or whose lifts are longer, are divided.
         """
+        found: list[Curves | None] = [None] * len(curves)
+        todo = dict(enumerate(curves))
         for _ in range(DIVISIONS):
-            shorter = self.shorten(curve, strength)
-            states = self.states(shorter)
-            good, _ = connect(states[:-1], states[1:], self.demands)
-            if good.all():
-                return shorter
-            bad = ~good
-            bad[1:] |= ~good[:-1]
-            bad[:-1] |= ~good[1:]
-            if len(states) + bad.sum() > MOST_NODES:
+            shorter = self._shorten(list(todo.values()), strengths)
+            left = {}
+            for k, curve, (linked, good) in zip(todo, shorter, self._lifts(shorter), strict=True):
+                if linked:
+                    found[k] = curve
+                divided = None if good.all() else self._divided(curve, good)
+                if divided is not None:
+                    left[k] = divided
+            todo, strengths = left, strengths[-1:]
+            if not todo:
                 break
-            divided = self._divided(curve, np.flatnonzero(bad))
-            if divided is None:
-                break
-            curve = divided
-        return None
+        return found
 
-    def _divided(self, curve: Curve, legs: Some) -> Curve | None:
-        """Curve with a further node in the middle of some legs; None if one meets a wall."""
-        at = curve.at
-        z, p = (0.5 * (each[legs] + each[legs + 1]) for each in (at.z, at.p))
-        there, found = project_onto_set(self._setting, z, p, at.rows[legs])
-        walls = self._walls(there)
-        if not found.all() or not (walls > 0.0).all():
+    def _lifts(self, curves: list[Curves]) -> list[tuple[bool, Flags]]:
+        """Whether all legs of each curve can be lifted, and which of them are as long as lifts."""
+        every, count = join_curves(curves), len(curves)
+        states, ends = self._steps.states(every), every.legs
+        linked, cost = connect(states[ends - 1], states[ends], self._closely)
+        place = embed(self._steps.setting, every.z, every.p)
+        chord = np.linalg.norm(place[ends] - place[ends - 1], axis=1)
+        length = every.sums(chord, ends, count)
+        close = linked & (cost - chord <= LONGER * length[every.route[ends]])
+        own = [every.route[ends] == route for route in range(count)]
+        return [(bool(linked[some].all()), close[some]) for some in own]
+
+    def _divided(self, curve: Curves, good: Flags) -> Curves | None:
+        """Curve with bad legs in four parts and those beside in two; None where that fails."""
+        bad = ~good
+        beside = bad.copy()
+        beside[1:] |= bad[:-1]
+        beside[:-1] |= bad[1:]
+        half = self._halved(curve, np.flatnonzero(beside))
+        if half is None:
             return None
-        z, p, rows = (
-            np.insert(old, legs + 1, new, axis=0)
-            for old, new in zip(
-                (at.z, at.p, at.rows), (there.z, there.p, at.rows[legs]), strict=True
-            )
-        )
-        shares = curve.shares.copy()
-        shares[legs] *= 0.5
-        shares = np.insert(shares, legs + 1, shares[legs])
-        every = np.insert(curve.walls, legs + 1, walls, axis=0)
-        return Curve(SetPoints(z, p, rows), every, shares)
+        first = np.arange(len(good)) + np.cumsum(beside) - beside
+        return self._halved(half, np.sort(np.concatenate([first[bad], first[bad] + 1])))
 
-    def shorten(self, curve: Curve, strength: float) -> Curve:
-        """Curve after Newton steps with walls of a strength, in squared lengths."""
-        strength = strength * self._squared_length(curve)
-        value = self._value(curve, strength)
+    def _halved(self, curve: Curves, legs: Some) -> Curves | None:
+        """Curve with a node in the middle of some legs; None if one is outside."""
+        if len(curve.z) + len(legs) > MOST_NODES:
+            return None
+        share = curve.share.copy()
+        share[legs + 1] *= 0.5
+        curve = replace(curve, share=share)
+        middle, inside = self._steps.between(curve.take(legs), curve.take(legs + 1))
+        if not inside.all():
+            return None
+        order = np.argsort(np.concatenate([np.arange(len(curve.z)), legs + 0.5]), kind="stable")
+        return Curves.concatenate([curve, middle]).take(order)
+
+    def _shorten(self, curves: list[Curves], strengths: tuple[float, ...]) -> list[Curves]:
+        """Curves after Newton steps with weaker and weaker walls."""
+        every, count = join_curves(curves), len(curves)
+        for strength in strengths[:-1]:
+            every = self._with_walls(every, count, strength, NEARLY)
+            every = every if self.demands.margin == 0.0 else self._with_floors(every)
+        return split_curves(self._with_walls(every, count, strengths[-1], ENOUGH), count)
+
+    def _with_walls(self, curves: Curves, count: int, strength: float, enough: float) -> Curves:
+        """Curves after steps with walls of a strength, relative to the squared lengths."""
+        steps, active = self._steps, np.arange(count)
+        strengths = strength * steps.squared_lengths(curves, count)
+        curves = steps.with_forces(curves, strengths)
         for _ in range(STEPS):
-            nearer = self._step(curve, strength, value)
-            if nearer is None:
+            rows = np.flatnonzero(np.isin(curves.route, active))
+            own = curves.take(rows)
+            value = steps.values(own, strengths)
+            own, lower = steps.step(own, strengths, value, HALVINGS)
+            curves = curves.with_rows(rows, own)
+            active = active[(value - lower > enough * np.abs(value))[active]]
+            if len(active) == 0:
                 break
-            before, (curve, value) = value, nearer
-            if before - value < ENOUGH * abs(before):
-                break
-        return curve
+        return curves
 
-    def states(self, curve: Curve) -> States:
-        """States at the nodes."""
-        return States(self.eset.structure, curve.at.z, curve.at.p)
+    def _with_floors(self, curves: Curves) -> Curves:
+        """Curves whose nodes keep as much margin as straight lifts between them lose.
 
-    def _step(self, curve: Curve, strength: float, value: float) -> tuple[Curve, float] | None:
-        """Curve after one step that lowers the value, and the new one; None if no step does."""
-        frames, at = tangents_at(self._setting, curve.at)
-        curve = replace(curve, at=at)
-        step, share = self._newton_step(curve, frames, strength)
-        for _ in range(HALVINGS):
-            moved = self._moved(curve, frames, share * step)
-            if moved is not None:
-                lower = self._value(moved, strength)
-                if lower < value:
-                    return moved, lower
-            share *= 0.5
-        return None
-
-    def _moved(self, curve: Curve, frames: Frames, step: Steps) -> Curve | None:
-        """Curve with its inner nodes moved; None if one of them meets a wall or leaves the set."""
-        inner = slice(1, len(step) - 1)
-        at = curve.at
-        own = SetPoints(at.z[inner], at.p[inner], at.rows[inner])
-        z, p = step_along(self._setting, own, frames[inner], step[inner])
-        there, found = project_onto_set(self._setting, z, p, own.rows)
-        if not found.all():
-            return None
-        walls = self._walls(there)
-        if not (walls > 0.0).all():
-            return None
-        z, p, all_walls = at.z.copy(), at.p.copy(), curve.walls.copy()
-        z[inner], p[inner], all_walls[inner] = there.z, there.p, walls
-        return Curve(SetPoints(z, p, at.rows), all_walls, curve.shares)
-
-    def _newton_step(self, curve: Curve, frames: Frames, strength: float) -> tuple[Steps, float]:
-        """Step of all nodes, and the share of it that keeps away from walls."""
-        rows, shares = curve.at.rows, curve.shares
-        legs = np.diff(self._place(curve), axis=0) / shares[:, None]
-        inner, d = slice(1, len(rows) - 1), rows.shape[1]
-        gradient = 2.0 * np.einsum("kde,ke->kd", rows[inner], legs[:-1] - legs[1:])
-        slopes = self._slopes(curve, frames)[inner]
-        walls, weight = curve.walls[inner], strength * 0.5 * (shares[:-1] + shares[1:])
-        pull = slopes / walls[:, :, None]
-        gradient -= weight[:, None] * pull.sum(axis=1)
-        blocks = weight[:, None, None] * np.einsum("kwd,kwe->kde", pull, pull)
-        blocks += 2.0 * (1.0 / shares[:-1] + 1.0 / shares[1:])[:, None, None] * np.eye(d)
-        turns = np.einsum("kde,kfe->kdf", rows[1:-2], rows[2:-1])
-        beside = -2.0 / shares[1:-1, None, None] * turns
-        step = np.zeros((len(rows), d))
-        step[inner] = solve_block_tridiagonal(blocks, beside, -gradient)
-        toward = -np.einsum("kwd,kd->kw", slopes, step[inner])
-        with np.errstate(divide="ignore"):
-            room = np.where(toward > 0.0, (1.0 - HELD) * walls / toward, np.inf)
-        longest = np.linalg.norm(step, axis=1).max()
-        return step, float(min(1.0, room.min(), REACH / max(longest, 1e-300)))
-
-    def _place(self, curve: Curve) -> Float[np.ndarray, "nodes coordinates"]:
-        return embed(self._setting, curve.at.z, curve.at.p)
-
-    def _squared_length(self, curve: Curve) -> float:
-        legs = np.diff(self._place(curve), axis=0)
-        return float(((legs**2).sum(axis=1) / curve.shares).sum())
-
-    def _value(self, curve: Curve, strength: float) -> float:
-        around = 0.5 * (curve.shares[:-1] + curve.shares[1:])
-        logs = np.log(curve.walls[1:-1]).sum(axis=1)
-        return self._squared_length(curve) - strength * float(around @ logs)
-
-    def _walls(self, at: SetPoints) -> Walls:
-        """Distances of points from the walls: positive inside."""
-        structure, demands, free = self.eset.structure, self.demands, self._setting.free
-        margin = stability_margin(structure, at.z, at.p, MARGIN_ERROR) - demands.margin
-        excess = [each.excess(at.z, at.p) for each in demands.constraints]
-        box, scales = self.eset.box, self._setting.scales
-        place = at.p[:, free]
-        sides = [(place - box.lower) / scales, (box.upper - place) / scales]
-        return np.column_stack([margin, *(-each for each in excess), *sides])
-
-    def _slopes(self, curve: Curve, frames: Frames) -> Float[np.ndarray, "nodes walls d"]:
-        """Slopes of the walls along the tangents."""
-        at, columns = curve.at, []
-        for k in range(frames.shape[1]):
-            step = np.zeros((len(at), frames.shape[1]))
-            step[:, k] = NUDGE
-            z, p = step_along(self._setting, at, frames, step)
-            columns.append((self._walls(SetPoints(z, p, at.rows)) - curve.walls) / NUDGE)
-        return np.stack(columns, axis=2)
-
-
-def solve_block_tridiagonal(
-    blocks: Float[np.ndarray, "nodes d d"],
-    beside: Float[np.ndarray, "legs d d"],
-    rhs: Steps,
-) -> Steps:
-    """Solve with a symmetric matrix of blocks on the diagonal and of those to the right of it."""
-    count, d = rhs.shape
-    rows = np.zeros((count, d, 2 * d))  # of the upper triangle, each from its block on
-    rows[:, :, :d], rows[:-1, :, d:] = blocks, beside
-    band = np.zeros((2 * d, count * d))
-    for k in range(2 * d):  # the k-th diagonal above the main one
-        for i in range(d):
-            if i + k < 2 * d:
-                columns = np.arange(i + k, count * d, d)
-                band[2 * d - 1 - k, columns] = rows[: len(columns), i, i + k]
-    return np.asarray(solveh_banded(band, rhs.ravel()).reshape(count, d))
+        Near folds the square of a margin, and what a lift loses of it, are regular.
+        """
+        structure, demanded, ends = self.eset.structure, self.demands.margin, curves.legs
+        z, p = (0.5 * (each[ends - 1] + each[ends]) for each in (curves.z, curves.p))
+        middle, margin = settle(structure, z, p), curves.walls[:, 0] + curves.floor
+        none = np.zeros(len(ends))
+        found = softest_modes(structure, middle.z, middle.p, none, curves.pairs[ends], ROUGHLY)
+        first, second = margin[ends - 1] ** 2, margin[ends] ** 2
+        mean, known = 0.5 * (first + second), middle.found & found.above
+        sag = 4.0 * (mean - np.where(known, np.minimum(found.first**2, mean), 0.0))
+        # of a parabola, below the lower one of its ends
+        loss = np.maximum(sag - np.abs(second - first), 0.0) ** 2 / (4.0 * np.maximum(sag, 1e-300))
+        loss[np.minimum(first, second) > demanded**2 + LOSSES * loss] = 0.0
+        lost = np.zeros(len(margin))
+        np.maximum.at(lost, ends, loss)
+        np.maximum.at(lost, ends - 1, loss)
+        floor = np.sqrt(demanded**2 + lost)
+        floor = np.minimum(floor, demanded + TAKEN * np.maximum(margin - demanded, 0.0))
+        walls = curves.walls.copy()
+        walls[:, 0] = margin - floor
+        return replace(curves, walls=walls, floor=floor)

@@ -23,7 +23,6 @@ from equimorph.tasks.planning.network import (
     neighbours,
     network_of,
     nodes_with_ends,
-    on_paths,
     walk_back,
 )
 from equimorph.tasks.planning.objectives import ROUGH
@@ -179,7 +178,7 @@ class _Search:
             path, cost = self._cheapest(both, np.concatenate([costs[inner], self.own_costs]))
             if path is None:
                 return None
-            used = inner[on_paths(network.pairs[inner], [path])]
+            used = network.links_of([path % len(self.states)])
             if network.lift_links(used, self.states, self.demands):
                 return self._divide_at_snaps(path, cost)
 
@@ -293,10 +292,9 @@ def _crossing(
     parts = part[: i + 1], onward[j:]
     best, least = _join(eset, parts, place), np.inf
     for _ in range(ROUNDS):
-        before, after = (
-            straight_corners(eset, join_states(eset.structure, pair), demands)
-            for pair in ((parts[0], place.approach.batch), (place.beyond.batch, parts[1]))
-        )
+        pairs = (parts[0], place.approach.batch), (place.beyond.batch, parts[1])
+        ways = [join_states(eset.structure, pair) for pair in pairs]
+        before, after = straight_corners(eset, ways, demands)
         spent, owed = _costs_along(before, demands), _costs_along(after, demands)
         m = max(int(np.searchsorted(owed, 0.5 * owed[-1])), 1)
         before_now = least

@@ -1,11 +1,11 @@
 """Paths over a mesh made straight, moved to where they cost least, and verified as routes."""
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from equimorph.arrays import Bool, Flags, Int, Lanes, Parameters
+from equimorph.arrays import Bool, Flags, Int, Lanes, Parameters, Some, Values
 from equimorph.equilibria import Guards, ParameterLine, TraceOptions, settle
 from equimorph.equilibria.trace import trace
 from equimorph.equilibria.trace_options import EventCode
@@ -32,10 +32,8 @@ MERGED = 8
 """Legs that may become one."""
 GAIN = 1e-4
 """Share of the cost that a shorter list of corners may cost more."""
-FINE_GAIN = 5e-5
-"""The same where corners come from shortest curves."""
-UNSURE = 0.05
-"""Share of its cost by which a chord may mislead about a leg."""
+FINE_GAIN, NEARLY = 5e-5, 1.0
+"""The same where corners come from shortest curves, and what the best list may save, in corners."""
 
 
 def straighten(states: States, demands: Demands, same_class: bool = False) -> States:
@@ -147,36 +145,65 @@ def _lift_straight(states: States, p: Parameters, demands: Demands) -> tuple[Lan
 
 
 def _thin_out(corners: States, demands: Demands, same_class: bool, gain: float = GAIN) -> States:
-    """Fewest corners whose chain costs hardly more."""
+    """Fewest corners whose chain costs hardly more.
+
+    Costs along chords say which legs are lifted: those of the best chain, until all of it are.
+    """
     first, second = np.triu_indices(len(corners), 1)
     near = second - first <= (3 if demands.objective.needs_margins else MERGED)
     first, second = first[near], second[near]
-    if not same_class:
-        some = _promising(corners, first, second, demands)
-        first, second = first[some], second[some]
-    linked, cost = connect(corners[first], corners[second], demands)
-    if same_class:
-        linked &= _swept(first, second, linked)
-    consecutive = cost[second - first == 1].sum()
-    pairs = np.stack([first[linked], second[linked]], axis=1)
-    each = cost[linked] + gain * consecutive
-    path = shortest_path(len(corners), pairs, each, (0, len(corners) - 1))
-    return corners if path is None else corners[path]
+    legs = _Legs(first, second, *chords(corners, first, second, demands))
+    legs.linked[second - first == 1] = True
+    each = gain * legs.cost[second - first == 1].sum()
+    while True:
+        path = legs.cheapest(each, legs.linked)
+        if path is None:
+            return corners
+        used = legs.along(path, same_class)
+        fresh = used[~legs.lifted[used]]
+        known = legs.cheapest(each, legs.linked & legs.lifted)
+        if len(fresh) == 0 or legs.spent(known, each) <= legs.spent(path, each) + NEARLY * each:
+            return corners[path if len(fresh) == 0 else known]
+        found = connect(corners[first[fresh]], corners[second[fresh]], demands)
+        legs.linked[fresh], legs.cost[fresh] = found
+        legs.lifted[fresh] = True
+        if same_class:
+            legs.linked &= _swept(first, second, legs.linked | ~legs.lifted)
 
 
-def _promising(
-    corners: States,
-    first: Int[np.ndarray, " pairs"],
-    second: Int[np.ndarray, " pairs"],
-    demands: Demands,
-) -> Int[np.ndarray, " some"]:
-    """Legs, and those unions of legs whose chords do not cost clearly more than these."""
-    good, cost = chords(corners, first, second, demands)
-    leg = second - first == 1
-    before = np.concatenate([[0.0], np.cumsum(cost[leg])])
-    apart = before[second] - before[first]
-    allowed = (1.0 + UNSURE) * apart + GAIN * before[-1] * (second - first - 1)
-    return np.flatnonzero(leg | (good & (cost <= allowed)))
+@dataclass
+class _Legs:
+    """Pairs of corners, whether they seem or are known to be linked, and at what cost."""
+
+    first: Some
+    second: Some
+    linked: Flags
+    cost: Values
+
+    def __post_init__(self) -> None:
+        """Nothing is lifted yet."""
+        self.lifted, count = np.zeros(len(self.first), bool), int(self.second.max()) + 1
+        self.number = np.zeros((count, count), int)
+        self.number[self.first, self.second] = np.arange(len(self.first))
+
+    def cheapest(self, each: float, some: Flags) -> Some | None:
+        """Corners of the cheapest chain of some legs, of which each costs more; None without."""
+        pairs, count = np.stack([self.first[some], self.second[some]], axis=1), len(self.number)
+        return shortest_path(count, pairs, self.cost[some] + each, (0, count - 1))
+
+    def along(self, path: Some, same_class: bool) -> Some:
+        """Legs of a chain; within a class all shorter ones from the same corners, too."""
+        used = self.number[path[:-1], path[1:]]
+        if not same_class:
+            return used
+        begun = self.number[path[:-1], path[:-1] + 1]
+        return np.concatenate([np.arange(*ends) for ends in zip(begun, used + 1, strict=True)])
+
+    def spent(self, path: Some | None, each: float) -> float:
+        """Cost of a chain; infinite without one."""
+        if path is None:
+            return np.inf
+        return float(self.cost[self.number[path[:-1], path[1:]]].sum() + each * (len(path) - 1))
 
 
 def order_ends(ends: Ends) -> Ends:
@@ -234,10 +261,27 @@ def way_points_of(eset: EquilibriumSet, corners: States) -> Corners:
 
 
 def straight_corners(
-    eset: EquilibriumSet, path: States, demands: Demands, same_class: bool = False
+    eset: EquilibriumSet, paths: Sequence[States], demands: Demands, same_class: bool = False
+) -> list[States]:
+    """Corners of straightened paths, both ends of each among them."""
+    closely = replace(demands, closely=True)
+    curves = Shortener(eset, demands).curves_near(paths)
+    return [
+        _cheapest_corners(
+            eset,
+            path,
+            demands,
+            None if curve is None else _thin_out(curve, closely, same_class, FINE_GAIN),
+            same_class,
+        )
+        for path, curve in zip(paths, curves, strict=True)
+    ]
+
+
+def _cheapest_corners(
+    eset: EquilibriumSet, path: States, demands: Demands, shortest: States | None, same_class: bool
 ) -> States:
-    """Corners of a straightened path, both ends among them."""
-    shortest = _shortest_corners(eset, path, demands, same_class)
+    """Corners of the shortest curve near a path, or cheaper ones where other than lengths count."""
     if shortest is not None and demands.objective.is_length:
         return shortest
     free = np.array([position(eset.structure.parameters, name) for name in eset.names])
@@ -254,17 +298,6 @@ def _total(way: States, demands: Demands) -> float:
     """Cost of straight lifts from corner to corner; infinite if one of them fails."""
     linked, cost = connect(way[:-1], way[1:], demands)
     return float(cost.sum()) if linked.all() else np.inf
-
-
-def _shortest_corners(
-    eset: EquilibriumSet, path: States, demands: Demands, same_class: bool
-) -> States | None:
-    """Corners of the shortest curve near a path; None if none was found."""
-    shortener, closely = Shortener(eset, demands), replace(demands, closely=True)
-    curve = shortener.curve_near(path)
-    if curve is None:
-        return None
-    return _thin_out(shortener.states(curve), closely, same_class, FINE_GAIN)
 
 
 def check_margin(route: Route, demands: Demands) -> Route:

@@ -310,8 +310,9 @@ def _solve(
     found &= eset.box.holds(p[:, known.setting.free], slack=AT_EDGE)
     found[found] &= structure.resolved(z[found], p[found])
     found[found] &= worst_relative_excess(within, z[found], p[found]) <= AT_EDGE
-    states = States(structure, z[found], p[found])
-    owner = owner[found]
+    states, owner = States(structure, z[found], p[found]), owner[found]
+    held = known.holds(states)
+    states, owner = states[held], owner[held]
     bounds = np.searchsorted(owner, np.arange(len(targets) + 1))
     groups = []
     for first, last in pairwise(bounds):

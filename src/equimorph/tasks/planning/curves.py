@@ -1,0 +1,355 @@
+"""Curves on a set that Newton's method makes shorter, away from walls.
+
+See `equimorph.tasks.planning.shortening` for what is least. Steps are those of a primal-dual method
+[NocedalWright2006]_, section 19.3: the forces y_j of the walls are unknowns, too, with
+``y_j g_j = ν w``, so that walls may become weaker by large factors. Several curves are made shorter
+at once, each by its own steps.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from scipy.linalg import solveh_banded
+
+from equimorph.arrays import Flags, Float, Frames, Int, Lanes, Parameters, Rows, Some, Values
+from equimorph.columns import Columns
+from equimorph.manifold import EquilibriumSet
+from equimorph.manifold.geometry.setting import Setting, embed
+from equimorph.manifold.queries.nearest import SetPoints
+from equimorph.structures import States
+from equimorph.structures.margin import Pairs, first_pairs, softest_modes
+from equimorph.tasks.optimising.tangent_steps import (
+    project_onto_set,
+    step_along,
+    tangent_planes,
+    tangents_at,
+    unconstrained_setting,
+)
+from equimorph.tasks.planning.network import Demands
+
+NUDGE = 1e-4
+"""Step along the tangents of the differences of constraints, in the metric."""
+MODE_ERROR = 1e-4
+"""Error of margins, relative to their distance from the wall."""
+HELD = 0.1
+"""Share of its distance to a wall that a node keeps in one step, by the slope of the wall."""
+REACH = 0.3
+"""Longest step of a node, in the metric."""
+BELOW, PUSHES, NEARER = 0.05, 3, 0.5
+"""Margin below its floor down to which a node is moved inside, how often, and the part of the
+distance from a wall that it may lack."""
+INWARD, SMALL = 1e-3, 1e-6
+"""Distance from walls to which nodes on them are moved, as a share of the largest margin, of bounds
+and of the box; and the least margin that counts for it."""
+BALANCE = 10.0
+"""Factor by which forces of walls may differ from those of the barrier."""
+
+Walls = Float[np.ndarray, "nodes walls"]
+Steps = Float[np.ndarray, "nodes d"]
+Routes = Int[np.ndarray, " nodes"]
+
+
+@dataclass(frozen=True)
+class Curves(Columns):
+    """Nodes of curves on a set, curve after curve.
+
+    Parameters
+    ----------
+    route
+        Number of the curve of each node.
+    z, p
+        The nodes.
+    rows
+        Planes near the tangent spaces.
+    walls
+        Distances from the walls, between the ends of the curves.
+    forces
+        Of the walls.
+    pairs
+        Softest modes.
+    floor
+        Least margin of each node.
+    share
+        Of the leg that leads to a node in the length of its curve; one at the first node.
+    """
+
+    route: Routes
+    z: Lanes
+    p: Parameters
+    rows: Rows
+    walls: Walls
+    forces: Walls
+    pairs: Pairs
+    floor: Values
+    share: Values
+
+    @property
+    def legs(self) -> Some:
+        """Nodes at the ends of legs: all but the first of each curve."""
+        return 1 + np.flatnonzero(self.route[1:] == self.route[:-1])
+
+    @property
+    def inner(self) -> Some:
+        """Nodes between the ends of curves."""
+        same = self.route[1:] == self.route[:-1]
+        return 1 + np.flatnonzero(same[1:] & same[:-1])
+
+    @property
+    def weights(self) -> Values:
+        """Shares of the length around each inner node."""
+        inner = self.inner
+        return np.asarray(0.5 * (self.share[inner] + self.share[inner + 1]))
+
+    def sums(self, values: Values, nodes: Some, routes: int) -> Values:
+        """Sums over the nodes of each curve."""
+        return np.bincount(self.route[nodes], values, routes)
+
+
+@dataclass(frozen=True)
+class CurveSteps:
+    """Newton's method for curves on a set within demands.
+
+    Parameters
+    ----------
+    eset
+        The set.
+    demands
+        Constraints that every node obeys; floors of margins belong to the curves.
+    """
+
+    eset: EquilibriumSet
+    demands: Demands
+
+    @cached_property
+    def setting(self) -> Setting:
+        """The set without its constraints: steps may cross these."""
+        return unconstrained_setting(self.eset)
+
+    def curve(self, nodes: States) -> Curves | None:
+        """Curve through given stable states, its legs of equal shares; None if one meets a wall.
+
+        Nodes on walls are moved inside.
+        """
+        count = len(nodes)
+        rows = tangent_planes(self.setting, nodes)
+        pairs = first_pairs(self.eset.structure, count)
+        floor, share = np.full(count, self.demands.margin), np.full(count, 1.0 / (count - 1))
+        share[0] = 1.0
+        walls, pairs, _ = self._walls(nodes.z, nodes.p, floor, pairs)
+        route = np.zeros(count, int)
+        curve = Curves(route, nodes.z, nodes.p, rows, walls, walls, pairs, floor, share)
+        margin = max(float(walls[:, 0].max()), SMALL)
+        sides = np.tile((self.eset.box.upper - self.eset.box.lower) / self.setting.scales, 2)
+        sizes = np.array([margin, *(each.size for each in self.demands.constraints), *sides])
+        distance = np.broadcast_to(INWARD * sizes, walls[1:-1].shape)
+        inner, good = self.inside(curve.take(slice(1, -1)), distance)
+        return curve.with_rows(curve.inner, inner) if good.all() else None
+
+    def states(self, curves: Curves) -> States:
+        """States at the nodes."""
+        return States(self.eset.structure, curves.z, curves.p)
+
+    def squared_lengths(self, curves: Curves, routes: int) -> Values:
+        """Squares of the lengths."""
+        place, ends = embed(self.setting, curves.z, curves.p), curves.legs
+        legs = ((place[ends] - place[ends - 1]) ** 2).sum(axis=1) / curves.share[ends]
+        return curves.sums(legs, ends, routes)
+
+    def values(self, curves: Curves, strengths: Values) -> Values:
+        """Squared lengths with barriers."""
+        inner, routes = curves.inner, len(strengths)
+        logs = curves.weights * np.log(curves.walls[inner]).sum(axis=1)
+        barriers = strengths * curves.sums(logs, inner, routes)
+        return self.squared_lengths(curves, routes) - barriers
+
+    def with_forces(self, curves: Curves, strengths: Values) -> Curves:
+        """Curves with the forces of barriers."""
+        inner, forces = curves.inner, np.ones_like(curves.walls)
+        strength = strengths[curves.route[inner]] * curves.weights
+        forces[inner] = strength[:, None] / curves.walls[inner]
+        return replace(curves, forces=forces)
+
+    def step(
+        self, curves: Curves, strengths: Values, values: Values, halvings: int
+    ) -> tuple[Curves, Values]:
+        """Curves after one step of each, and their values; as they were where no step lowers it."""
+        frames, at = tangents_at(self.setting, SetPoints(curves.z, curves.p, curves.rows))
+        curves = replace(curves, rows=at.rows)
+        step, push, share = self._newton_step(curves, frames, strengths)
+        out, lowest, todo = curves, values.copy(), np.unique(curves.route)
+        for _ in range(halvings):
+            some = np.flatnonzero(np.isin(curves.route, todo))
+            part = share[curves.route[some], None]
+            moved, good = self._moved(
+                curves.take(some), frames[some], part * step[some], part * push[some], strengths
+            )
+            lower = np.full(len(values), np.inf)
+            fine = np.flatnonzero(good[moved.route])
+            lower[good] = self.values(moved.take(fine), strengths)[good]
+            better = lower < values
+            rows = np.flatnonzero(better[moved.route])
+            out, lowest = (
+                out.with_rows(some[rows], moved.take(rows)),
+                np.where(better, lower, lowest),
+            )
+            todo = todo[~better[todo]]
+            if len(todo) == 0:
+                break
+            share[todo] *= 0.5
+        return out, lowest
+
+    def _moved(
+        self, curves: Curves, frames: Frames, step: Steps, push: Walls, strengths: Values
+    ) -> tuple[Curves, Flags]:
+        """Curves with their inner nodes moved, and which of them stay on the set and inside."""
+        inner, good = curves.inner, np.zeros(len(strengths), bool)
+        own = curves.take(inner)
+        at = SetPoints(own.z, own.p, own.rows)
+        z, p = step_along(self.setting, at, frames[inner], step[inner])
+        there, found = project_onto_set(self.setting, z, p, own.rows)
+        moved, inside = self.placed(own, there)
+        beyond = np.flatnonzero(found & ~inside)
+        if len(beyond):  # where a wall bends, they move along it
+            again, inside[beyond] = self.inside(moved.take(beyond), own.walls[beyond])
+            moved = moved.with_rows(beyond, again)
+        good[curves.route] = True
+        good[own.route[~(found & inside)]] = False
+        balance = (strengths[own.route] * curves.weights)[:, None] / np.abs(moved.walls)
+        forces = np.clip(own.forces + push[inner], balance / BALANCE, BALANCE * balance)
+        return curves.with_rows(inner, replace(moved, forces=forces)), good
+
+    def between(self, first: Curves, second: Curves) -> tuple[Curves, Flags]:
+        """Nodes between pairs of nodes, and which of them are inside."""
+        z, p = 0.5 * (first.z + second.z), 0.5 * (first.p + second.p)
+        middle = replace(second, z=z, p=p, rows=first.rows)
+        return self.inside(middle, 0.5 * (first.walls + second.walls))
+
+    def inside(self, nodes: Curves, distance: Walls) -> tuple[Curves, Flags]:
+        """Nodes on the set, and which of them are inside.
+
+        Those with less than half of a given distance from a wall are moved there.
+        """
+        setting, below = self.setting, replace(nodes, floor=nodes.floor - BELOW)
+        there, found = project_onto_set(setting, nodes.z, nodes.p, nodes.rows)
+        for _ in range(PUSHES):
+            below, _ = self.placed(below, there)
+            lack = distance - below.walls
+            lack[:, 0] += BELOW
+            worst = (lack / distance).argmax(axis=1)
+            some = np.flatnonzero((lack > NEARER * distance).any(axis=1) & found)
+            if len(some) == 0:
+                break
+            frames, at = tangents_at(setting, there.take(some))
+            slopes = self._slopes(below.take(some), frames)[np.arange(len(some)), worst[some]]
+            push = lack[some, worst[some]] / np.maximum((slopes**2).sum(axis=1), 1e-300)
+            z, p = step_along(setting, at, frames, push[:, None] * slopes)
+            moved, found[some] = project_onto_set(setting, z, p, at.rows)
+            there = there.with_rows(some, moved)
+        nodes, inside = self.placed(nodes, there)
+        return nodes, found & inside
+
+    def placed(self, nodes: Curves, there: SetPoints) -> tuple[Curves, Flags]:
+        """Nodes elsewhere, and which of them no wall parts from the others."""
+        walls, pairs, inside = self._walls(there.z, there.p, nodes.floor, nodes.pairs)
+        moved = replace(nodes, z=there.z, p=there.p, rows=there.rows, walls=walls, pairs=pairs)
+        return moved, inside
+
+    def _newton_step(
+        self, curves: Curves, frames: Frames, strengths: Values
+    ) -> tuple[Steps, Walls, Values]:
+        """Steps of all nodes, changes of the forces, and the share that keeps away from walls."""
+        inner, rows = curves.inner, curves.rows
+        place, d = embed(self.setting, curves.z, curves.p), rows.shape[1]
+        pull = np.zeros_like(place)
+        pull[1:] = np.diff(place, axis=0) / curves.share[1:, None]
+        gradient = np.zeros((len(place), d))
+        gradient[inner] = 2.0 * np.einsum("kde,ke->kd", rows[inner], pull[inner] - pull[inner + 1])
+        own = curves.take(inner)
+        slopes = self._slopes(own, frames[inner])
+        barrier = (strengths[own.route] * curves.weights)[:, None] / own.walls
+        gradient[inner] -= np.einsum("kw,kwd->kd", barrier, slopes)
+        stiffness = own.forces / own.walls
+        blocks = np.tile(np.eye(d), (len(place), 1, 1))
+        blocks[inner] *= 2.0 * (1.0 / own.share + 1.0 / curves.share[inner + 1])[:, None, None]
+        blocks[inner] += np.einsum("kw,kwd,kwe->kde", stiffness, slopes, slopes)
+        both = inner[np.append(np.diff(inner) == 1, False)]  # and the next one
+        beside = np.zeros((len(place) - 1, d, d))
+        turns = np.einsum("kde,kfe->kdf", rows[both], rows[both + 1])
+        beside[both] = -2.0 * turns / curves.share[both + 1, None, None]
+        step = solve_block_tridiagonal(blocks, beside, -gradient)
+        along = np.einsum("kwd,kd->kw", slopes, step[inner])
+        push = np.zeros_like(curves.walls)
+        push[inner] = barrier - own.forces - stiffness * along
+        with np.errstate(divide="ignore"):
+            room = np.where(along < 0.0, (HELD - 1.0) * own.walls / along, np.inf).min(axis=1)
+        length = np.linalg.norm(step[inner], axis=1)
+        share = np.ones(len(strengths))
+        np.minimum.at(share, own.route, np.minimum(room, REACH / np.maximum(length, 1e-300)))
+        return step, push, share
+
+    def _walls(
+        self, z: Lanes, p: Parameters, floor: Values, pairs: Pairs
+    ) -> tuple[Walls, Pairs, Flags]:
+        """Distances of points from the walls, softest modes, and which points are inside."""
+        structure, free = self.eset.structure, self.setting.free
+        found = softest_modes(structure, z, p, floor, pairs, MODE_ERROR)
+        excess = [-each.excess(z, p) for each in self.demands.constraints]
+        box, scales = self.eset.box, self.setting.scales
+        place = p[:, free]
+        sides = [(place - box.lower) / scales, (box.upper - place) / scales]
+        walls = np.column_stack([found.first - floor, *excess, *sides])
+        return walls, found.pairs, found.above & (walls > 0.0).all(axis=1)
+
+    def _slopes(self, nodes: Curves, frames: Frames) -> Float[np.ndarray, "nodes walls d"]:
+        """Slopes of the walls along the tangents.
+
+        Those of a margin with mode w are ``wᵀ D²F[w, t]``, of constraints differences.
+        """
+        structure, d = self.eset.structure, frames.shape[1]
+        count, constraints = len(nodes.z), self.demands.constraints
+        out = np.zeros((count, nodes.walls.shape[1], d))
+        at, still = SetPoints(nodes.z, nodes.p, nodes.rows), np.zeros_like(nodes.p)
+        mode = np.ascontiguousarray(nodes.pairs[:, 0])
+        units = np.repeat(np.eye(d)[:, None], count, axis=1)
+        for k in range(d):
+            z, p = step_along(self.setting, at, frames, NUDGE * units[k])
+            dz, dp = (z - nodes.z) / NUDGE, (p - nodes.p) / NUDGE
+            bent = structure.second_derivative(nodes.z, nodes.p, (mode, still), (dz, dp))
+            out[:, 0, k] = np.einsum("ki,ki->k", bent, mode)
+            for number, each in enumerate(constraints, 1):
+                out[:, number, k] = -(each.excess(z, p) + nodes.walls[:, number]) / NUDGE
+        steps = np.swapaxes(frames[:, :, structure.size :], 1, 2)
+        first = 1 + len(constraints)
+        out[:, first:] = np.concatenate([steps, -steps], axis=1)
+        return out
+
+
+def join_curves(curves: Sequence[Curves]) -> Curves:
+    """Curves numbered in turn."""
+    numbered = [replace(curve, route=np.full(len(curve.z), k)) for k, curve in enumerate(curves)]
+    return Curves.concatenate(numbered)
+
+
+def split_curves(curves: Curves, count: int) -> list[Curves]:
+    """Curves one by one."""
+    return [curves.take(curves.route == route) for route in range(count)]
+
+
+def solve_block_tridiagonal(
+    blocks: Float[np.ndarray, "nodes d d"],
+    beside: Float[np.ndarray, "legs d d"],
+    rhs: Steps,
+) -> Steps:
+    """Solve with a symmetric matrix of blocks on the diagonal and of those to the right of it."""
+    count, d = rhs.shape
+    rows = np.zeros((count, d, 2 * d))  # of the upper triangle, each from its block on
+    rows[:, :, :d], rows[:-1, :, d:] = blocks, beside
+    band = np.zeros((2 * d, count * d))
+    for k in range(2 * d):  # the k-th diagonal above the main one
+        for i in range(d):
+            if i + k < 2 * d:
+                columns = np.arange(i + k, count * d, d)
+                band[2 * d - 1 - k, columns] = rows[: len(columns), i, i + k]
+    return np.asarray(solveh_banded(band, rhs.ravel()).reshape(count, d))
