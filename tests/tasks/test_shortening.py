@@ -8,7 +8,8 @@ from equimorph.manifold.queries.nearest import SetPoints
 from equimorph.structures import State, States, stability_margin
 from equimorph.tasks.optimising.tangent_steps import step_along, tangents_at
 from equimorph.tasks.planning.curves import CurveSteps, solve_block_tridiagonal
-from equimorph.tasks.planning.network import Demands, cheapest_path
+from equimorph.tasks.planning.mesh_paths import cheapest_path
+from equimorph.tasks.planning.network import Demands
 from equimorph.tasks.planning.objectives import length_through
 from oracles.spring_geodesics import shortest_length
 from sets import arch_set, spring_set

@@ -162,7 +162,7 @@ class CurveSteps:
         inner, routes = curves.inner, len(strengths)
         logs = curves.weights * np.log(curves.walls[inner]).sum(axis=1)
         barriers = strengths * curves.sums(logs, inner, routes)
-        return self.squared_lengths(curves, routes) - barriers
+        return np.asarray(self.squared_lengths(curves, routes) - barriers)
 
     def with_forces(self, curves: Curves, strengths: Values) -> Curves:
         """Curves with the forces of barriers."""

@@ -14,11 +14,10 @@ from equimorph.structures import States, join_states, stability_margin
 from equimorph.tasks.optimising.programme import Objective
 from equimorph.tasks.planning.bottlenecks import Passing, find_bottleneck
 from equimorph.tasks.planning.filtration import Filtration
+from equimorph.tasks.planning.mesh_paths import cheap_paths, cheapest_path
 from equimorph.tasks.planning.network import (
     Demands,
     Ends,
-    cheap_paths,
-    cheapest_path,
     connect,
     explain_no_route,
 )

@@ -93,8 +93,8 @@ class Shortener:
     def rough_lengths(self, paths: Sequence[States]) -> list[float]:
         """Lengths of shortened curves of few nodes near paths; infinite without one."""
         curves, lengths = [self._curve_along(path, FEW) for path in paths], [np.inf] * len(paths)
-        some = [k for k, curve in enumerate(curves) if curve is not None]
-        shorter = self._shorten([curves[k] for k in some], STRENGTHS) if some else []
+        some = {k: curve for k, curve in enumerate(curves) if curve is not None}
+        shorter = self._shorten(list(some.values()), STRENGTHS) if some else []
         for k, curve in zip(some, shorter, strict=True):
             lengths[k] = float(self._gaps(self._steps.states(curve)).sum())
         return lengths

@@ -22,11 +22,11 @@ from equimorph.manifold import EquilibriumSet, equilibrium_set
 from equimorph.manifold.queries.locate import pieces_of
 from equimorph.model import Box, Constraint
 from equimorph.structures import State, States, join_states
+from equimorph.tasks.planning.mesh_paths import cheapest_path
 from equimorph.tasks.planning.network import (
     MATCH,
     Demands,
     Ends,
-    cheapest_path,
     lift_straight,
     shortest_path,
 )

@@ -159,11 +159,11 @@ def _thin_out(corners: States, demands: Demands, same_class: bool, gain: float =
         path = legs.cheapest(each, legs.linked)
         if path is None:
             return corners
+        known = legs.cheapest(each, legs.linked & legs.lifted)
+        if known is not None and legs.spent(known, each) <= legs.spent(path, each) + NEARLY * each:
+            return corners[known]
         used = legs.along(path, same_class)
         fresh = used[~legs.lifted[used]]
-        known = legs.cheapest(each, legs.linked & legs.lifted)
-        if len(fresh) == 0 or legs.spent(known, each) <= legs.spent(path, each) + NEARLY * each:
-            return corners[path if len(fresh) == 0 else known]
         found = connect(corners[first[fresh]], corners[second[fresh]], demands)
         legs.linked[fresh], legs.cost[fresh] = found
         legs.lifted[fresh] = True
@@ -193,16 +193,14 @@ class _Legs:
 
     def along(self, path: Some, same_class: bool) -> Some:
         """Legs of a chain; within a class all shorter ones from the same corners, too."""
-        used = self.number[path[:-1], path[1:]]
+        used = np.asarray(self.number[path[:-1], path[1:]])
         if not same_class:
             return used
         begun = self.number[path[:-1], path[:-1] + 1]
         return np.concatenate([np.arange(*ends) for ends in zip(begun, used + 1, strict=True)])
 
-    def spent(self, path: Some | None, each: float) -> float:
-        """Cost of a chain; infinite without one."""
-        if path is None:
-            return np.inf
+    def spent(self, path: Some, each: float) -> float:
+        """Cost of a chain."""
         return float(self.cost[self.number[path[:-1], path[1:]]].sum() + each * (len(path) - 1))
 
 

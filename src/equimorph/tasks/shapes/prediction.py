@@ -92,7 +92,7 @@ class Predictor:
         """
         count = np.arange(1, 1 + min(BESIDE, len(self.eset.cells)))
         gap, cell = self._middles.query(embed(self.setting, states.z, states.p), k=count)
-        near = gap <= self._sides[0][cell]
+        near = gap <= self._sizes[cell]
         return np.asarray(
             (near & (self.eset.cell_index[cell] == states.index[:, None])).any(axis=1)
         )
@@ -117,30 +117,33 @@ class Predictor:
         return hits.weights[chosen], hits.cell[chosen], hits.point[chosen]
 
     @cached_property
-    def _sides(self) -> tuple[Float[np.ndarray, " C"], Int[np.ndarray, " C"]]:
-        """Longest side of each cell from its first corner, and on which side of folds it lies.
+    def _sizes(self) -> Float[np.ndarray, " C"]:
+        """Longest side of each cell from its first corner."""
+        corners = places_of(self.eset)[self.eset.cells]
+        return np.asarray(np.linalg.norm(corners[:, 1:] - corners[:, :1], axis=2).max(axis=1))
+
+    @cached_property
+    def _sides(self) -> Int[np.ndarray, " C"]:
+        """On which side of folds each cell lies.
 
         Cells of one index on which the descriptors move with the parameters in the same sense.
         """
         eset = self.eset
-        places = places_of(eset)
         first, rest = eset.cells[:, 0], eset.cells[:, 1:]
-        size = np.max([np.linalg.norm(places[c] - places[first], axis=1) for c in rest.T], axis=0)
         moves = (
             np.sign(np.linalg.det(each[rest] - each[first][:, None]))
             for each in (self.values, eset.coordinates)
         )
-        return size, np.asarray(2 * eset.cell_index + (next(moves) * next(moves) > 0), int)
+        return np.asarray(2 * eset.cell_index + (next(moves) * next(moves) > 0), int)
 
     def _different(self, hits: Hits) -> Items:
         """Predictions that are not close to an earlier one from the same side of folds."""
-        size, side = self._sides
         corners, structure = self.eset.cells[hits.cell], self.setting.structure
         n, free = structure.unknowns, self.setting.free
         u = np.einsum("ck,cki->ci", hits.weights, self.eset.points.z[corners, :n])
         p = np.einsum("ck,cki->ci", hits.weights, self.eset.points.p[corners][:, :, free])
         place = np.concatenate([u * np.sqrt(structure.mass), p / self.setting.scales], axis=1)
-        reach, side = CLOSE * size[hits.cell], side[hits.cell]
+        reach, side = CLOSE * self._sizes[hits.cell], self._sides[hits.cell]
         bounds = np.searchsorted(hits.point, np.arange(hits.point.max(initial=-1) + 2))
         kept: list[int] = []
         for first, last in pairwise(bounds.tolist()):
