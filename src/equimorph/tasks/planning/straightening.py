@@ -30,6 +30,8 @@ MOST_CORNERS = 32
 """Most corners of a path whose legs are divided."""
 MERGED = 8
 """Legs that may become one."""
+BETWEEN = 3e-4
+"""Share of a demanded margin by which lifts may lose more of it between watched states."""
 GAIN = 1e-4
 """Share of the cost that a shorter list of corners may cost more."""
 FINE_GAIN, NEARLY = 5e-5, 1.0
@@ -262,8 +264,8 @@ def straight_corners(
     eset: EquilibriumSet, paths: Sequence[States], demands: Demands, same_class: bool = False
 ) -> list[States]:
     """Corners of straightened paths, both ends of each among them."""
-    closely = replace(demands, closely=True)
-    curves = Shortener(eset, demands).curves_near(paths)
+    closely = _closely(paths, demands)
+    curves = Shortener(eset, closely).curves_near(paths)
     return [
         _cheapest_corners(
             eset,
@@ -274,6 +276,15 @@ def straight_corners(
         )
         for path, curve in zip(paths, curves, strict=True)
     ]
+
+
+def _closely(paths: Sequence[States], demands: Demands) -> Demands:
+    """Demands on lifts as fine as the final ones, which meet other states between the same ends."""
+    if demands.margin == 0.0:
+        return replace(demands, closely=True)
+    least = min(float(path[[0, -1]].margin.min()) for path in paths)
+    more = min((1.0 + BETWEEN) * demands.margin, least)
+    return replace(demands, closely=True, margin=max(more, demands.margin))
 
 
 def _cheapest_corners(
