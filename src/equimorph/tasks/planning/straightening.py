@@ -280,7 +280,7 @@ def straight_corners(
 
 def _closely(paths: Sequence[States], demands: Demands) -> Demands:
     """Demands on lifts as fine as the final ones, which meet other states between the same ends."""
-    if demands.margin == 0.0:
+    if demands.margin == 0.0 or not paths:
         return replace(demands, closely=True)
     least = min(float(path[[0, -1]].margin.min()) for path in paths)
     more = min((1.0 + BETWEEN) * demands.margin, least)
