@@ -3,7 +3,7 @@
 ``python benchmarks/list_kernel_calls.py`` after the tests, the slow ones, too, have run since the
 last change of a kernel. Those of the package that are called from Python are listed, the largest
 code first. Marked are those that a set of a small spring needs, and of those that one of an arch
-needs what belongs to sets of any structure.
+and its figure need what belongs to sets of any structure.
 """
 
 import ast
@@ -19,7 +19,7 @@ import equimorph as em
 from equimorph.linalg.compile_ahead import LIST
 
 PACKAGE = Path(em.__file__).parent
-OF_SETS = ("equimorph.equilibria.", "equimorph.manifold.", "equimorph.marching.")
+OF_SETS = tuple(f"equimorph.{each}." for each in ("equilibria", "manifold", "marching", "plotting"))
 ARRAY = re.compile(r"Array\((\w+), (\d), 'C', False, aligned=True\)")
 
 
@@ -81,6 +81,7 @@ def calls_of_small_sets() -> set[tuple[str, tuple[object, ...]]]:
     eset = em.equilibrium_set(arch, box, fixed={"q": 2.5}, within=within, intervals=(5, 9))
     with TemporaryDirectory() as folder:
         em.explore(eset, {}, Path(folder) / "page.html")
+        em.plotting.surface(eset).figure.savefig(Path(folder) / "set.png")
     Dispatcher._compile_for_args = compile_here
     return by_spring | {each for each in made if each[0].startswith(OF_SETS)}
 

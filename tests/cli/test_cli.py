@@ -502,13 +502,16 @@ def test_warnings_of_libraries_do_not_reach_the_user(tmp_path: Path):
 @pytest.mark.parametrize(("kept", "compiles"), [((True, True), False), ((True, False), True)])
 def test_kernels_are_compiled_first_if_one_is_missing(kept, compiles, tmp_path, monkeypatch):
     """A run that meets a kernel without code would compile it in the middle, on one core."""
-    calls = [SimpleNamespace(is_kept=each) for each in kept]
-    done: list[object] = []
+    calls = [SimpleNamespace(is_kept=each, is_loop=False) for each in kept]
+    loop = SimpleNamespace(is_kept=False, is_loop=True)
+    done, behind = list[object](), list[object]()
     monkeypatch.setattr(run, "read_problem", lambda _: (None, None, None))
-    monkeypatch.setattr(run, "calls_of", lambda _: calls)
+    monkeypatch.setattr(run, "calls_of", lambda _: [loop, *calls])
     monkeypatch.setattr(run, "compile_ahead", done.append)
+    monkeypatch.setattr(run, "compile_behind", behind.extend)
     monkeypatch.setattr(run, "run_study", lambda *_, **__: SimpleNamespace(refused=()))
     monkeypatch.setattr(run, "_show", lambda *_: None)
     with unchecked():
         run.run_and_show(tmp_path, tmp_path, Output(quiet=True), replace=False)
     assert done == ([calls] if compiles else [])
+    assert behind == [loop]

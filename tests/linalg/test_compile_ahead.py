@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import equimorph as em
-from equimorph.linalg import compile_ahead as ahead
+from equimorph.linalg import compile_ahead as ahead, compiled
 from equimorph.linalg.compiled import kept_signatures
 from equimorph.study import read_problem
 
@@ -85,3 +85,32 @@ def test_of_processes_that_need_a_kernel_one_compiles_it(source: str, tmp_path: 
     ]
     told = sorted(other.communicate()[0].split(maxsplit=1)[1] for other in others)
     assert told == ["Counter()\n", "Counter({(Array(float64, 1, 'C', False, aligned=True),): 1})\n"]
+
+
+def test_what_another_process_compiles_is_done_without(
+    source: str, monkeypatch: pytest.MonkeyPatch
+):
+    """Loops are awaited until their code is on disk, whoever puts it there."""
+    call = ahead.KernelCall(7, f"{source}.twice", "(float64[::1],)", is_common=False)
+    begun = []
+    monkeypatch.setattr(ahead, "Popen", lambda command, **_: begun.append(command))
+    monkeypatch.setattr(compiled, "AWAITED", awaited := set())
+    monkeypatch.setattr(ahead, "AWAITED", awaited)
+    ahead.compile_behind([call])
+    assert begun[0][-2:] == [ahead.BEHIND, "7"]
+    assert compiled.is_awaited(call.kernel)
+    call.kernel.compile(call.types)
+    assert not compiled.is_awaited(call.kernel)
+    ahead.compile_behind([call])
+    assert len(begun) == 1
+
+
+def test_a_study_needs_no_loops(monkeypatch: pytest.MonkeyPatch):
+    """While they are compiled, paths are followed by smaller kernels, to the same bits."""
+    arch, loops = em.Rod(load="uniform"), [each for each in ahead.known_calls() if each.is_loop]
+    start = arch.natural_state(Theta=1.0, Delta=0.5)
+    ready = em.limit_load(start, "q")
+    monkeypatch.setattr(compiled, "AWAITED", {each.name for each in loops})
+    monkeypatch.setattr(compiled, "kept_signatures", lambda _: [])
+    assert len(loops) == 2
+    assert em.limit_load(start, "q").value == ready.value

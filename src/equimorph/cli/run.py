@@ -6,7 +6,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from equimorph.cli.output import Output
-from equimorph.linalg.compile_ahead import calls_of, compile_ahead
+from equimorph.linalg.compile_ahead import calls_of, compile_ahead, compile_behind
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Descriptor, Workers
 from equimorph.structures import States
@@ -41,12 +41,14 @@ def run_and_show(
     """
     _, _, problem = read_problem(file)
     calls = calls_of(problem)
-    if not all(each.is_kept for each in calls):
+    needed = [each for each in calls if not each.is_loop]
+    if not all(each.is_kept for each in needed):
         output.show("The first run compiles the kernels: under a minute, and only once.")
         try:
-            compile_ahead(calls)
+            compile_ahead(needed)
         except KeyboardInterrupt:
             raise KeyboardInterrupt(COMPILED) from None
+    compile_behind(each for each in calls if each.is_loop)
     with output.progress() as progress:
         outcome = run_study(file, out, replace=replace, progress=progress, workers=workers)
     _show(outcome, output)

@@ -4,6 +4,7 @@ import numpy as np
 
 from equimorph.arrays import Float, Int, Lanes, Parameters
 from equimorph.equilibria.curves import Curve, ParameterLine
+from equimorph.linalg.compiled import is_awaited
 from equimorph.marching import kernels
 from equimorph.model import Constraint
 from equimorph.structures import Advance
@@ -15,13 +16,18 @@ Line = tuple[Parameters, Parameters]
 def compiled_steps(
     curve: Curve, z: Lanes, constraints: tuple[Constraint, ...]
 ) -> tuple[CompiledSteps, Line] | None:
-    """Loops of the structure, and starts and velocities of straight lines, where the arrays fit."""
+    """Loops of the structure, and starts and velocities of straight lines.
+
+    None where the arrays do not fit, or another process still compiles the loops.
+    """
     if not isinstance(curve, ParameterLine):
         return None
     structure = curve.structure
     wide = (len(curve.start), len(structure.parameters))
     fits = curve.start.shape == curve.velocity.shape == wide and z.shape[1] == structure.size
     steps = structure.compiled_steps(constraints) if fits else None
+    if steps and (is_awaited(steps.march) or is_awaited(steps.search)):
+        return None
     line = np.ascontiguousarray(curve.start), np.ascontiguousarray(curve.velocity)
     return None if steps is None else (steps, line)
 

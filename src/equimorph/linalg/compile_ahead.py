@@ -6,6 +6,7 @@ call is compiled with them. ``python -m equimorph.linalg.compile_ahead`` compile
 """
 
 import gc
+import os
 import sys
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -19,11 +20,16 @@ from typing import Any
 from numba.core.dispatcher import Dispatcher
 from numba.core.sigutils import normalize_signature
 
-from equimorph.linalg.compiled import is_being_compiled, kept_signatures
+from equimorph.linalg.compiled import AWAITED, is_being_compiled, kept_signatures
 from equimorph.linalg.lanes import cores
 
 LIST = Path(__file__).with_name("kernel_calls.txt")
 PACKAGE = __name__.partition(".")[0]
+LOOPS = "march_kernels"
+"""End of the names of modules whose kernels are loops made of others: without them results are the
+same, later."""
+BEHIND = "behind"
+"""First word to a process that compiles while others have something better to do."""
 
 
 @dataclass(frozen=True)
@@ -38,6 +44,11 @@ class KernelCall:
     """Their types, as numba reads them."""
     is_common: bool
     """Whether every study makes it."""
+
+    @property
+    def is_loop(self) -> bool:
+        """Whether the smaller kernels that it is made of do the same."""
+        return self.name.rpartition(".")[0].endswith(LOOPS)
 
     @cached_property
     def kernel(self) -> Any:
@@ -125,8 +136,7 @@ def compile_ahead(calls: Iterable[KernelCall]) -> None:
         Those to be made later.
     """
     missing = [each for each in calls if not each.is_kept]
-    command = [sys.executable, "-m", __name__ if __name__ != "__main__" else __spec__.name]
-    command += [str(each.number) for each in missing]
+    command = _command(missing)
     helpers = [
         Popen(command, stdout=DEVNULL, stderr=DEVNULL)
         for _ in range(min(cores(), len(missing)) - 1)
@@ -141,6 +151,30 @@ def compile_ahead(calls: Iterable[KernelCall]) -> None:
             helper.wait()
 
 
+def compile_behind(calls: Iterable[KernelCall]) -> None:
+    """Let a process that outlives this one compile what is not on disk; do without it meanwhile.
+
+    Parameters
+    ----------
+    calls
+        Of loops.
+    """
+    missing = [each for each in calls if not each.is_kept]
+    if missing:
+        AWAITED.update(each.name for each in missing)
+        command, none = _command(missing, BEHIND), DEVNULL
+        _BEHIND.append(Popen(command, stdin=none, stdout=none, stderr=none, start_new_session=True))
+
+
+_BEHIND: list[Popen[bytes]] = []
+"""Kept, for a process that is forgotten while it runs gives a warning."""
+
+
+def _command(calls: list[KernelCall], *words: str) -> list[str]:
+    module = __name__ if __name__ != "__main__" else __spec__.name
+    return [sys.executable, "-m", module, *words, *(str(each.number) for each in calls)]
+
+
 def _share(calls: Iterable[KernelCall]) -> None:
     for each in calls:
         if not each.is_kept and not is_being_compiled(each.kernel):
@@ -151,7 +185,10 @@ def main() -> None:
     """Compile all calls, or, as a helper, a share of those whose numbers are given."""
     known = known_calls()
     gc.disable()  # compiling makes many objects that live on; this process ends soon
-    if numbers := sys.argv[1:]:
+    numbers = [each for each in sys.argv[1:] if each != BEHIND]
+    if len(numbers) < len(sys.argv) - 1:
+        os.nice(19)
+    if numbers:
         _share([known[int(each)] for each in numbers])
     else:
         compile_ahead(known)

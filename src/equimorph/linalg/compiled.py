@@ -32,6 +32,9 @@ IMPORTED = re.compile(r"^from (equimorph(?:\.\w+)+) import", re.MULTILINE)
 CHECK = 32
 """Bytes of the checksum before compiled code: damaged code would crash the process."""
 
+AWAITED: set[str] = set()
+"""Names of kernels that another process compiles while this one does without them."""
+
 
 def njit(**options: Any) -> Callable[[Any], Any]:
     """Compile a function when it is first called with arguments of new types, and keep the code.
@@ -92,6 +95,20 @@ def kept_signatures(kernel: Any) -> list[Any]:
         A function that `njit` of this module returned.
     """
     return [key[0] for key in kernel._cache._cache_file._load_index()]
+
+
+def is_awaited(kernel: Any) -> bool:
+    """Whether another process compiles a kernel that this one can do without, and has not finished.
+
+    Parameters
+    ----------
+    kernel
+        A function that `njit` of this module returned.
+    """
+    name = f"{kernel.py_func.__module__}.{kernel.py_func.__name__}"
+    if name in AWAITED and kept_signatures(kernel):
+        AWAITED.remove(name)
+    return name in AWAITED
 
 
 def is_being_compiled(kernel: Any) -> bool:

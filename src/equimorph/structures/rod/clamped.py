@@ -18,10 +18,10 @@ from equimorph.structures.rod.clamped_derivative_kernels import (
     residual_lanes,
     second_lanes,
 )
+from equimorph.structures.rod.clamped_fields import ClampedFields
 from equimorph.structures.rod.clamped_kernels import advance_lanes
 from equimorph.structures.rod.clamped_march_kernels import march_lanes, search_lanes
 from equimorph.structures.rod.discretisation import Mesh
-from equimorph.structures.rod.fields import ClampedFields
 from equimorph.structures.rod.inertia import inextensible_force, inextensible_inertia
 from equimorph.structures.rod.mechanics import Bounds, PlanarMechanics
 from equimorph.structures.rod.planar_energy import PlanarEnergy
@@ -51,6 +51,7 @@ class ClampedMechanics(PlanarMechanics):
         self.layout = CondensedLayout(scaled, np.array([1, mesh.elements - 1]))
         self.unknowns = len(mesh.nodes) - 2
         self.mass = mesh.weights[1:-1].copy()
+        self.recovery = ClampedFields(mesh, load, self.layout.stiffness, self.rho)
 
     @cached_property
     def _matrices(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -76,11 +77,6 @@ class ClampedMechanics(PlanarMechanics):
         theta[:, 1:-1] = z[:, : self.unknowns]
         theta[:, 0], theta[:, -1] = p[:, 1] + p[:, 0], p[:, 1] - p[:, 0]
         return theta
-
-    @cached_property
-    def recovery(self) -> ClampedFields:
-        """Fields inside elements with the accuracy of the vertices."""
-        return ClampedFields(self.mesh, self.load, self.layout.stiffness, self.rho)
 
     def fields(
         self, z: Lanes, p: Parameters, s: Float[np.ndarray, " points"]

@@ -28,7 +28,7 @@ from equimorph.structures.equations import (
     Solver,
 )
 from equimorph.structures.rod.discretisation import Reference
-from equimorph.structures.rod.fields import GeneralFields
+from equimorph.structures.rod.general_fields import GeneralFields
 from equimorph.structures.rod.general_kernels import linearise_lanes, second_lanes
 from equimorph.structures.rod.general_step_kernels import advance_lanes
 from equimorph.structures.rod.inertia import following, moved_places, place_derivatives
