@@ -426,6 +426,26 @@ def test_a_run_interrupted_before_it_begins_says_what_is_kept(
     assert _says_one_line(shell, f"interrupted; {kept}. Run again to go on.")
 
 
+@pytest.mark.parametrize("module", ["typer", "equimorph.cli.run"])
+def test_ctrl_c_while_modules_are_imported_is_one_line(module: str, tmp_path: Path):
+    """Before the first line of the command line's own code has run, and in a command."""
+    (tmp_path / "spring.toml").write_text(SPRING)
+    code = (
+        "import os, signal, sys\n"
+        "class Stop:\n"
+        "    def find_spec(self, name, *_):\n"
+        f"        if name == {module!r}: os.kill(os.getpid(), signal.SIGINT)\n"
+        "sys.meta_path.insert(0, Stop())\n"
+        "from equimorph.cli import main\n"
+        "main()\n"
+    )
+    command = [sys.executable, "-c", code, "run", "spring.toml"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=tmp_path)
+    assert done.returncode == 130
+    (line,) = done.stderr.splitlines()
+    assert line.startswith("equimorph: interrupted; ")
+
+
 def test_memory_that_runs_out_is_one_line(shell: Shell, monkeypatch: pytest.MonkeyPatch):
     def run_out(*_: object, **__: object) -> None:
         raise MemoryError

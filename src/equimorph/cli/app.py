@@ -48,6 +48,10 @@ Kind = StrEnum(  # type: ignore[misc]  # a member called strip would hide that o
 ARCH = Kind("arch")
 
 
+class InterruptedRunError(Exception):
+    """Ctrl-C ended a run; the message says what is kept."""
+
+
 def quiet_libraries() -> None:
     """Keep to itself what libraries warn of, like a font that is missing: users cannot act on it.
 
@@ -72,12 +76,16 @@ def main() -> None:
     except InputError as error:
         _complain(str(error))
         sys.exit(BAD_INPUT)
-    except (typer.Abort, KeyboardInterrupt):
-        _complain("interrupted.")
+    except InterruptedRunError as stop:
+        _complain(f"interrupted; {stop}. Run again to go on.")
         sys.exit(INTERRUPTED)
+    except (typer.Abort, KeyboardInterrupt):
+        code = INTERRUPTED
     except MemoryError:
         _complain(OUT_OF_MEMORY)
         sys.exit(BAD_INPUT)
+    if code == INTERRUPTED:  # typer says nothing itself
+        _complain("interrupted; nothing had begun.")
     sys.exit((code or 0) if words else BAD_INPUT)
 
 
@@ -256,9 +264,7 @@ def _run_one(file: Path, out: Path, workers: Any, *, replace: bool, **shown: boo
         refused = run_and_show(file, out, output, replace=replace, workers=workers)
         return REFUSED if refused else 0
     except KeyboardInterrupt as stop:
-        kept = str(stop) or f"what is finished is kept in {out}"
-        typer.echo(f"equimorph: interrupted; {kept}. Run again to go on.", err=True)
-        raise typer.Exit(INTERRUPTED) from None
+        raise InterruptedRunError(str(stop) or f"what is finished is kept in {out}") from None
 
 
 def _exit_code(
