@@ -15,16 +15,17 @@ from typecheck import unchecked
 BOX = em.Box(p=(-1, 1), r=(-1, 1))
 STRIP, LIPS = (1, 3), (1, 1)
 """Components and Euler characteristic: a plane and a sphere around a circle, and a disc."""
+SIZES, TINY = (0.002, 0.03), (0.001, 0.004)
 
 
-def island(number, kind):
-    """Random ellipse |y| < 1, y = (u/a, v/b), half axes 0.002 to 0.03 and at least a tenth of that.
+def island(number, kind, seed=77, sizes=SIZES):
+    """Random ellipse |y| < 1, y = (u/a, v/b), half axes of a size and at least a tenth of that.
 
     Strip: x (x² + w² (|y|² − 1)) = 0. Lips: x³ + h ((v/b)² − 1) x + 0.385 h^1.5 u/a = 0, which has
     three roots inside of two arcs that meet in cusps at (0, ±b); the sheet is bent for odd numbers.
     """
-    generator = np.random.default_rng([77, number])
-    half = 10.0 ** generator.uniform(np.log10(0.002), np.log10(0.03))
+    generator = np.random.default_rng([seed, number])
+    half = 10.0 ** generator.uniform(*np.log10(sizes))
     other = half * 10.0 ** generator.uniform(-1.0, 0.0)
     centre, angle = generator.uniform(-0.8, 0.8, 2), generator.uniform(0.0, np.pi)
     grid = tuple(int(count) for count in generator.integers(8, 13, 2))
@@ -67,6 +68,74 @@ def assert_whole(eset, known):
 def test_islands_that_no_edge_meets_are_lifted(number, kind, known):
     """Cells of 0.2; the last island is two fingers 0.0024 wide, of which one was cut off."""
     assert_whole(island(number, kind), known)
+
+
+def test_an_island_whose_edges_all_meet_one_arc_of_it_is_no_closed_piece():
+    """Of two arcs that meet in cusps, all edges at the only vertex in the lips cross the same one.
+
+    Their fold points were joined along this arc, forth and back: a second component, a sphere.
+    """
+    assert_whole(island(51, "lips", 78, TINY), LIPS)
+
+
+def island_in_space(number, kind):
+    """Random ellipsoid y = (u/a, v/b, w/c), |y| < 1; half axes 0.01 to 0.15 in cells of 0.3 to 0.5.
+
+    Lips: x³ + h (v²/b² + w²/c² − 1) x + 0.385 h^1.5 u/a = 0, bent for odd numbers: the graph of u,
+    a ball. Sphere: x² + ε² (|y|² − 1) = 0 beside x = 3: a three-sphere and a ball.
+    """
+    seed = {"lips": 77, "sphere": 81}[kind]
+    generator = np.random.default_rng([seed, number, 3])
+    half = 10.0 ** generator.uniform(np.log10(0.01), np.log10(0.15))
+    axes = half * 10.0 ** generator.uniform(-0.7, 0.0, 3)
+    axes[0] = half
+    centre = generator.uniform(-0.7, 0.7, 3)
+    turn = np.linalg.qr(generator.normal(size=(3, 3)))[0] / axes[:, None]
+    grid = tuple(int(count) for count in generator.integers(4, 7, 3))
+    away = [f"({name} - ({at:.17g}))" for name, at in zip("prs", centre, strict=True)]
+    u, v, w = ("(" + " + ".join(f"({t:.17g})*{y}" for t, y in zip(row, away, strict=True)) + ")"
+               for row in turn)  # fmt: skip
+    if kind == "lips":
+        height, x = 10.0 ** generator.uniform(-3.0, -1.0), "x"
+        if number % 2:
+            bends = generator.uniform(-0.5, 0.5, 4)
+            x = "(x - ({:.17g})*p - ({:.17g})*r - ({:.17g})*p*r - ({:.17g})*s)".format(*bends)
+        level, slope = f"{height:.17g}*({v}**2 + {w}**2 - 1)", f"{0.385 * height**1.5:.17g}*{u}"
+        energy = f"{x}**4/4 + {level}*{x}**2/2 + {slope}*{x}"
+        at = {"p": 0.0, "r": 0.0, "s": 0.0}
+        roots = np.roots([1.0, 0.0, eval(level, at), eval(slope, at)])
+        start = float(roots[np.abs(roots.imag) < 1e-9].real[0])
+    else:
+        c, start = generator.uniform(-0.5, 0.5), 3.0
+        square = f"({c**2:.17g} + {half**2:.17g}*({u}**2 + {v}**2 + {w}**2 - 1))"
+        energy = (
+            f"x**4/4 - ({2 * c + 3:.17g})*x**3/3 + ({6 * c:.17g} + {square})*x**2/2 - 3*{square}*x"
+        )
+    unknown = em.Unknown("x", start, guesses=(-2.5, 3.5))
+    parameters = [em.Parameter(name, "1", 1.0, "actuator", 0.0) for name in "prs"]
+    with unchecked():
+        return em.equilibrium_set(
+            em.EnergyStructure(energy, [unknown], parameters),
+            em.Box(p=(-1, 1), r=(-1, 1), s=(-1, 1)),
+            intervals=grid,
+        )
+
+
+BALL, SPHERE = (1, 1), (2, 1)
+"""Components and Euler characteristic; that of a three-sphere is zero."""
+
+
+@pytest.mark.parametrize(
+    ("number", "kind", "known"),
+    [
+        (3, "lips", BALL),
+        (1, "sphere", SPHERE),
+        *(pytest.param(k, "lips", BALL, marks=pytest.mark.slow) for k in (1, 4)),
+    ],
+)
+def test_islands_over_three_parameters_are_in_one_piece(number, kind, known):
+    """Lips were closed in two to four pieces, the sphere in two, under clean audits."""
+    assert_whole(island_in_space(number, kind), known)
 
 
 @pytest.mark.slow

@@ -36,6 +36,8 @@ FIRM = 100.0
 """Force of a push along a soft mode, over stiffness times length of the mode."""
 HOMOTOPIES = 0.05
 """Share of the guesses from which Newton homotopy starts (where Newton found nothing)."""
+MEANS = 3
+"""Known states of which guesses between them are means."""
 NUDGE = 0.1
 """Part of the way from an equilibrium to a random guess, where deflated Newton starts."""
 WIDE_STEPS = TraceOptions(
@@ -170,6 +172,22 @@ class Pools:
             outcome = trace(line, self.z[new[lanes]], (), steps_for(10.0**each))
             returned = outcome.code == EventCode.RETURNED
             self._polish(outcome.z[returned], group[returned])
+
+    def start_between(self, count: int) -> None:
+        """Newton homotopies from random means of known states, `count` over each point.
+
+        Guesses of the structure may lie far apart where it has many unknowns; its states are
+        where others are.
+        """
+        states = np.bincount(self.group, minlength=len(self.ground.p))
+        group = np.repeat(np.flatnonzero(states > 1), count)
+        if len(group) == 0:
+            return
+        order, first = np.argsort(self.group, kind="stable"), np.cumsum(states) - states
+        number = self.generator.integers(states[group][:, None], size=(len(group), MEANS))
+        weights = self.generator.dirichlet(np.ones(MEANS), len(group))
+        chosen = self.z[order[first[group][:, None] + number]]
+        self._by_homotopy(np.einsum("nk,nki->ni", weights, chosen), group)
 
     def _forces(self, pairs: Pairs) -> Lanes:
         """Random forces, as strong as pushes from states to guesses."""

@@ -132,6 +132,8 @@ COMPLETIONS = 8
 """Rounds in which what descents, searches between minima and pushes found serves them again."""
 NO_RUN = -1
 """Instead of the number of a run: found by descents, or between minima."""
+BETWEEN = 100
+"""Guesses between known states, over each point in each of these rounds."""
 REPEATS = 3
 """Times that the runs at a point are made, at most: again while an equilibrium was found once."""
 
@@ -290,6 +292,7 @@ def _complete_by_arguments(
         pools = Pools(ground, generator, graph.z, graph.group)
         pools.push(pushed)
         pools.push_softly(pushed)
+        pools.start_between(BETWEEN)
         pushed = len(graph)
         if len(pools.z) == known and not lacking:
             break

@@ -11,7 +11,8 @@ from equimorph.arrays import Bool
 from equimorph.manifold.geometry.crossings import crossing_directions
 from equimorph.manifold.geometry.exact_points import pin_crossings
 from equimorph.manifold.lifting.cells import Cells
-from equimorph.manifold.lifting.fold_chords import Turns, chords_across, lie_inside, ways_out
+from equimorph.manifold.lifting.courses import ways_out
+from equimorph.manifold.lifting.fold_chords import Turns, chords_across, lie_inside
 from equimorph.manifold.lifting.pairing import Pairing
 from equimorph.manifold.lifting.polygon_cuts import planes
 
@@ -35,5 +36,5 @@ def crossing_turns(pairing: Pairing, cells: Cells, wanted: Bool[np.ndarray, " T"
         return None
     span = planes(pairing, triangle.tolist())
     middle = pin_crossings(setting, points, ends.tolist(), span)
-    inside = middle.found & lie_inside(pairing, triangle, middle.p)
+    inside = middle.found & lie_inside(pairing, triangle, ends, middle.p)
     return Turns(ends, triangle, across, middle.z, middle.p, inside)

@@ -16,7 +16,9 @@ from equimorph.manifold.geometry.exact_points import pin
 from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.simplices import shares_in
 from equimorph.manifold.geometry.tangents import fold_forms
-from equimorph.manifold.lifting.cells import Cells
+from equimorph.manifold.geometry.topology import labels
+from equimorph.manifold.lifting.courses import Courses, on_sides
+from equimorph.manifold.lifting.grid import NEAR_AN_END
 from equimorph.manifold.lifting.pairing import Pairing
 from equimorph.manifold.lifting.polygon_cuts import chord_of, planes
 from equimorph.manifold.lifting.stationary_points import Starts
@@ -31,7 +33,10 @@ BENT = 0.97
 NEAR = -0.5
 """Barycentric coordinate above which a guess is tried."""
 BEYOND = -0.05
-"""Barycentric coordinate below which the middle of a fold lies beyond its triangle."""
+"""Barycentric coordinate below which the middle of a fold lies beyond its triangle, relative to
+their change from one of its ends to the other."""
+FACING = 0.1
+"""Distance from a side of a triangle, in lengths of its chord, up to which a fold faces others."""
 
 
 @dataclass(frozen=True)
@@ -39,19 +44,27 @@ class FoldChords(Columns):
     """Chords of folds from side to side of grid triangles.
 
     ends (n, 2): points; triangle: below them; normals: of unit length towards the existing sheets,
-    in scaled free parameters; cusped: whether there is a cusp between the ends.
+    in scaled free parameters; cusped: whether there is a cusp between the ends; courses: of
+    the folds in the triangles.
     """
 
     ends: Pairs
     triangle: Some
     normals: Float[np.ndarray, "n 2 d"]
     cusped: Flags
+    courses: Courses
 
     @property
     def cosines(self) -> Values:
         """Cosines of the angles between the sides of the folds at both ends; 1 at cusps."""
         turn = (self.normals[:, 0] * self.normals[:, 1]).sum(axis=1)
         return np.where(self.cusped, 1.0, turn)
+
+    @property
+    def sharp(self) -> Flags:
+        """Whether folds turn sharply, or lead away from their chords at an end."""
+        away = self.courses.cosines.min(axis=1) < SHARP
+        return np.asarray((self.cosines < SHARP) | away & ~self.cusped)
 
 
 def chords_across(
@@ -74,16 +87,46 @@ def chords_across(
     return ends[good], np.tile(owner, 3)[at[good]]
 
 
-def fold_chords(pairing: Pairing, cells: Cells, wanted: Bool[np.ndarray, " T"]) -> FoldChords:
+def fold_chords(pairing: Pairing, folds: Pairs, wanted: Bool[np.ndarray, " T"]) -> FoldChords:
     """Chords between folds on two sides of one grid triangle, of the flagged ones."""
-    ends, triangle = chords_across(pairing, cells.folds, wanted)
+    ends, triangle = chords_across(pairing, folds, wanted)
     points = pairing.points
     used, place = np.unique(ends, return_inverse=True)
     forms = fold_forms(pairing.setting, points.z[used], points.p[used])
     place = place.reshape(ends.shape)
     length = np.linalg.norm(forms.existence, axis=1, keepdims=True)
-    normals = forms.existence / np.maximum(length, 1e-300)
-    return FoldChords(ends, triangle, normals[place], forms.parted_by_cusps(*place.T))
+    normals = (forms.existence / np.maximum(length, 1e-300))[place]
+    courses = Courses.of(pairing, ends, triangle, normals)
+    return FoldChords(ends, triangle, normals, forms.parted_by_cusps(*place.T), courses)
+
+
+def facing_sides(pairing: Pairing, chords: FoldChords) -> tuple[Some, dict[int, float]]:
+    """Triangles on both sides of an edge that folds of one index bend to; where to split it.
+
+    No end of the edge lies between these folds, so that they may be one beyond it.
+    """
+    gap, place = chords.courses.nearest()
+    near = np.flatnonzero((gap < FACING) & ~chords.cusped)
+    triangle, index = chords.triangle[near], pairing.points.index[chords.ends[near, 0]]
+    edge, share = on_sides(pairing.mesh, triangle, chords.courses.third[near], place[near])
+    shares: dict[int, float] = {}
+    for each, low in np.unique(np.stack([edge, index], axis=1), axis=0).tolist():
+        own = np.flatnonzero((edge == each) & (index == low))
+        middle = float(share[own].mean())
+        apart = len(own) > 1 and _opposite(pairing, triangle[own])
+        if apart and NEAR_AN_END < middle < 1.0 - NEAR_AN_END:
+            shares[each] = middle
+    return triangle[np.isin(edge, list(shares))], shares
+
+
+def _opposite(pairing: Pairing, triangles: Some) -> bool:
+    """Whether triangles at an edge do not all hang together by grid tetrahedra between them."""
+    own = np.unique(triangles)
+    faces = pairing.mesh.faces
+    at = np.full(len(pairing.mesh.triangles), len(own))
+    at[own] = np.arange(len(own))
+    numbers = np.sort(at[faces[np.isin(faces, own).sum(axis=1) > 1]], axis=1)[:, :2]
+    return bool(labels(len(own), numbers).max(initial=0) > 0)
 
 
 @dataclass(frozen=True)
@@ -104,14 +147,18 @@ class Turns(Columns):
 
 def sharp_turns(pairing: Pairing, chords: FoldChords) -> Turns | None:
     """Folds that turn sharply, with their middles; None if there are none."""
-    sharp = chords.take(chords.cosines < SHARP)
+    sharp = chords.take(chords.sharp)
     parted = np.array([chord_of(*pair) in pairing.tips for pair in sharp.ends.tolist()], bool)
     sharp = sharp.take(~parted)
     if len(sharp.ends) == 0:
         return None
     span = planes(pairing, sharp.triangle.tolist())
     middle = pin(pairing.setting, pairing.points, sharp.ends.tolist(), VertexKind.FOLD, span)
-    inside = middle.found & lie_inside(pairing, sharp.triangle, middle.p)
+    inside = middle.found & lie_inside(pairing, sharp.triangle, sharp.ends, middle.p)
+    corners = pairing.mesh.vertices[pairing.mesh.triangles[sharp.triangle]]
+    inside &= sharp.courses.lead_to(shares_in(corners, middle.p[:, pairing.setting.free]))
+    if pairing.mesh.dimension == 3:  # faces are not parted at middles: chords stand for arcs
+        inside &= sharp.courses.cosines.min(axis=1) > 0.0
     known = np.flatnonzero(inside)
     inside[known] = _lie_between(pairing, sharp.ends[known], middle.z[known], middle.p[known])
     return Turns(sharp.ends, sharp.triangle, sharp.normals, middle.z, middle.p, inside)
@@ -134,10 +181,20 @@ def _lie_between(pairing: Pairing, ends: Pairs, z: Lanes, p: Parameters) -> Flag
     return good
 
 
-def lie_inside(pairing: Pairing, triangle: Some, p: Parameters) -> Flags:
-    """Whether parameters lie inside their grid triangles, or only a little beyond."""
-    corners = pairing.mesh.vertices[pairing.mesh.triangles[triangle]]
-    return np.asarray((shares_in(corners, p[:, pairing.setting.free]) > BEYOND).all(axis=1))
+def lie_inside(pairing: Pairing, triangle: Some, ends: Pairs, p: Parameters) -> Flags:
+    """Whether middles of curves between points on two sides of grid triangles lie inside these.
+
+    Beyond the third side none does; a middle beyond one of the two others, and only a little
+    relative to its ends, is one of a curve that leads along this side.
+    """
+    free, corners = pairing.setting.free, pairing.mesh.vertices[pairing.mesh.triangles[triangle]]
+    one, other = (shares_in(corners, pairing.points.p[each][:, free]) for each in ends.T)
+    reach = np.minimum(np.abs(other - one).max(axis=1, keepdims=True), 1.0)
+    third = np.ones_like(one)
+    for each in (one, other):
+        np.put_along_axis(third, each.argmin(axis=1)[:, None], 0.0, axis=1)
+    least = np.where(third > 0.0, 0.0, BEYOND * reach)
+    return np.asarray((shares_in(corners, p[:, free]) > least).all(axis=1))
 
 
 @dataclass(frozen=True)
@@ -194,43 +251,3 @@ def _meetings(pairing: Pairing, chords: FoldChords) -> Places:
     ends = pairing.points.p[chords.ends][:, :, pairing.setting.free] / scales
     level = (chords.normals * ends).sum(axis=2)
     return np.asarray((np.linalg.pinv(chords.normals) @ level[:, :, None])[:, :, 0] * scales)
-
-
-@dataclass(frozen=True)
-class WaysOut(Columns):
-    """Where the tangents at both ends of chords lead out of their triangles.
-
-    apexes (n, 2): number, in the triangle, of the corner opposite the side; middle (n, 3):
-    barycentric coordinates of the middle between both places.
-    """
-
-    apexes: Pairs
-    middle: Float[np.ndarray, "n 3"]
-
-
-def ways_out(
-    pairing: Pairing,
-    ends: Pairs,
-    triangle: Some,
-    normals: Float[np.ndarray, "n 2 d"],
-) -> WaysOut:
-    """Follow curves in the parameters straight from both their ends out of grid triangles.
-
-    `normals` are those to the curves, in scaled free parameters.
-    """
-    mesh, setting = pairing.mesh, pairing.setting
-    corners = mesh.vertices[mesh.triangles[triangle]]
-    across = np.stack([-normals[..., 1], normals[..., 0]], axis=-1) * setting.scales
-    apexes, places = [], []
-    for k in range(2):
-        start = pairing.points.p[ends[:, k]][:, setting.free]
-        shares = shares_in(corners, start)
-        rates = shares_in(corners, start + across[:, k]) - shares
-        # into the triangle, off the side on which the end lies
-        own = shares.argmin(axis=1)[:, None]
-        rates *= np.sign(np.take_along_axis(rates, own, axis=1))
-        way = np.where(rates < 0.0, shares / np.where(rates < 0.0, -rates, 1.0), np.inf)
-        np.put_along_axis(way, own, np.inf, axis=1)
-        apexes.append(way.argmin(axis=1))
-        places.append(shares + way.min(axis=1, keepdims=True) * rates)
-    return WaysOut(np.stack(apexes, axis=1), 0.5 * (places[0] + places[1]))

@@ -11,14 +11,16 @@ from equimorph.arrays import Bool, CellFlags, Float, Place, Some
 from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.setting import Setting
 from equimorph.manifold.lifting.cells import Cells, Seen
+from equimorph.manifold.lifting.courses import on_sides, ways_out
 from equimorph.manifold.lifting.crossing_chords import crossing_turns
 from equimorph.manifold.lifting.fold_chords import (
+    FoldChords,
     Turns,
     beyond_folds,
     facing_folds,
+    facing_sides,
     fold_chords,
     sharp_turns,
-    ways_out,
 )
 from equimorph.manifold.lifting.grid import NEAR_AN_END
 from equimorph.manifold.lifting.pairing import Pairing
@@ -35,12 +37,14 @@ class Unseen:
 
     hidden: cells in which something is joined or parted that their edges do not show; touching:
     free parameters of points at which two sheets touch; exits: edges through which tongues of the
-    set leave hidden cells, with the part of the way between their ends at which they do.
+    set leave hidden cells, with the part of the way between their ends at which they do; faces: of
+    tetrahedra, whose edges do not show what folds over them join.
     """
 
     hidden: Some
     touching: Places
     exits: dict[int, float] = field(default_factory=dict)
+    faces: Some = field(default_factory=lambda: np.zeros(0, int))
 
 
 class UnseenFinder:
@@ -54,7 +58,7 @@ class UnseenFinder:
     def __init__(self) -> None:
         self.exits: dict[int, float] = {}
         self._seen: Seen | None = None
-        self._hidden = np.zeros(0, int)
+        self._hidden = self._faces = np.zeros(0, int)
         self._touching: Places | None = None
 
     def look(self, pairing: Pairing, cells: Cells) -> Cells:
@@ -67,20 +71,27 @@ class UnseenFinder:
         wanted = new & ~crossed
         flags = wanted if d == 2 else wanted[mesh.faces].any(axis=1)
         flags[self._hidden] = True  # they wait for bisection
+        wanted[self._faces] = True
         found = [_holes(pairing, cells, flags)]
         if d == 2:
             found += [_necks(pairing, cells, flags), _strips(pairing, cells, new & crossed)]
+        else:
+            found.append(_torn_faces(pairing, cells, wanted))
         self.exits = {edge: share for each in found for edge, share in each.exits.items()}
         self._seen = seen
         before = np.zeros((0, d)) if self._touching is None else self._touching
         places = np.concatenate([before, *(each.touching for each in found)])
         self._touching = _distinct(places, pairing.setting)
-        doubtful = cells.doubtful_triangles if d == 2 else cells.doubtful_tetrahedra
         self._hidden = np.unique(np.concatenate([each.hidden for each in found]))
-        doubtful = np.union1d(doubtful, self._hidden)
-        if d == 2:
-            return replace(cells, doubtful_triangles=doubtful, touching=self._touching)
-        return replace(cells, doubtful_tetrahedra=doubtful, touching=self._touching)
+        self._faces = np.unique(np.concatenate([each.faces for each in found]))
+        triangles = np.union1d(cells.doubtful_triangles, self._hidden if d == 2 else self._faces)
+        tetrahedra = cells.doubtful_tetrahedra
+        return replace(
+            cells,
+            doubtful_triangles=triangles,
+            doubtful_tetrahedra=np.union1d(tetrahedra, self._hidden) if d == 3 else tetrahedra,
+            touching=self._touching,
+        )
 
 
 def _crossed(pairing: Pairing) -> Bool[np.ndarray, " T"]:
@@ -100,18 +111,36 @@ def _holes(pairing: Pairing, cells: Cells, wanted: CellFlags) -> Unseen:
 
 def _necks(pairing: Pairing, cells: Cells, wanted: Bool[np.ndarray, " T"]) -> Unseen:
     """Triangles in which folds are not what their chords say, and where sheets touch."""
-    chords = fold_chords(pairing, cells, wanted)
+    chords = fold_chords(pairing, cells.folds, wanted)
     facing = facing_folds(pairing, chords)
     found = stationary_points(pairing.setting, facing.starts, saddles=True)
     joined = found.parted & beyond_folds(pairing, chords, facing, found.place)
+    hidden, exits = _torn(pairing, chords)
+    hidden = np.concatenate([facing.starts.cell[joined], hidden])
+    return Unseen(hidden, found.place[found.touching], exits)
+
+
+def _torn_faces(pairing: Pairing, cells: Cells, wanted: Bool[np.ndarray, " T"]) -> Unseen:
+    """Faces of tetrahedra in which folds are not what their chords say."""
+    sides = np.concatenate([cells.folds[:, pair] for pair in ([0, 1], [1, 2], [0, 2])])
+    chords = fold_chords(pairing, np.unique(np.sort(sides, axis=1), axis=0), wanted)
+    faces, exits = _torn(pairing, chords)
+    return Unseen(faces[:0], np.zeros((0, 3)), exits, faces)
+
+
+def _torn(pairing: Pairing, chords: FoldChords) -> tuple[Some, dict[int, float]]:
+    """Triangles which folds leave between the ends of their chords, and the sides where they do.
+
+    Over two parameters, chords of folds that turn inside are parted there.
+    """
+    hidden, exits = facing_sides(pairing, chords)
     turns = sharp_turns(pairing, chords)
-    hidden, touching = facing.starts.cell[joined], found.place[found.touching]
     if turns is None:
-        return Unseen(hidden, touching)
-    _enter_tips(pairing, turns.take(turns.inside))
+        return hidden, exits
+    if pairing.mesh.dimension == 2:
+        _enter_tips(pairing, turns.take(turns.inside))
     outside = turns.take(~turns.inside)
-    hidden = np.concatenate([hidden, outside.triangle])
-    return Unseen(hidden, touching, _exits(pairing, outside))
+    return np.concatenate([hidden, outside.triangle]), exits | _exits(pairing, outside)
 
 
 def _strips(pairing: Pairing, cells: Cells, wanted: Bool[np.ndarray, " T"]) -> Unseen:
@@ -134,19 +163,12 @@ def _enter_tips(pairing: Pairing, turns: Turns) -> None:
 
 def _exits(pairing: Pairing, turns: Turns) -> dict[int, float]:
     """Edges to which curves lead straight from both their ends; where, in the middle of both."""
-    mesh = pairing.mesh
-    exits: dict[int, float] = {}
     ways = ways_out(pairing, turns.ends, turns.triangle, turns.normals)
-    apexes, middle = ways.apexes, ways.middle
-    for k in np.flatnonzero(apexes[:, 0] == apexes[:, 1]).tolist():
-        # sides are ab, bc, ca
-        first, last = (int(apexes[k, 0] + turn) % 3 for turn in (1, 2))
-        side = int(mesh.sides[turns.triangle[k], first])
-        turned = mesh.triangles[turns.triangle[k], first] != mesh.edges[side, 0]
-        share = float(middle[k, first if turned else last])
-        if NEAR_AN_END < share < 1.0 - NEAR_AN_END:
-            exits[side] = share
-    return exits
+    same = np.flatnonzero(ways.apexes[:, 0] == ways.apexes[:, 1])
+    given = turns.triangle[same], ways.apexes[same, 0], ways.middle[same]
+    sides, shares = on_sides(pairing.mesh, *given)
+    inner = (shares > NEAR_AN_END) & (shares < 1.0 - NEAR_AN_END)
+    return dict(zip(sides[inner].tolist(), shares[inner].tolist(), strict=True))
 
 
 def _distinct(places: Places, setting: Setting) -> Places:
