@@ -7,10 +7,12 @@ determined by its number; those in the file are not lifted again, so that a run 
 goes on. A summary follows; ``python benchmarks/soak_sets.py summary FILES`` adds up the lines of
 several runs, and repeats those that are not clean.
 
-Specimens are those of the tests of the contract, with elements as they are by default: rods,
-frames, trusses, chains, springs. Boxes, grids, values of the other parameters and constraints are
-random; symmetric values, zero, are as frequent as others. Half of the boxes are most of the range
-of their parameters, and half of the chains may wind as far as they like.
+Specimens are those of the tests of the contract: rods, frames, trusses, chains, springs, with as
+many elements as their bound of the curvature needs (`resolving`). Boxes, grids, values of the other
+parameters and constraints are random; symmetric values, zero, are as frequent as others. Half of
+the boxes are most of the range of their parameters, and half of the chains may wind as far as they
+like. Bounds are such that up to some tens of states lie over a point: a portal with |κ| ≤ 8 has
+over a hundred.
 """
 
 import sys
@@ -28,7 +30,14 @@ sys.path.insert(0, str(ROOT / "tests"))
 from equimorph.errors import InputError  # noqa: E402  # after the path of the specimens
 from equimorph.manifold import equilibrium_set  # noqa: E402
 from equimorph.model import Box, Constraint, Descriptor, Silent  # noqa: E402
-from equimorph.structures import Truss  # noqa: E402
+from equimorph.structures import (  # noqa: E402
+    Frame,
+    Rod,
+    SpatialFrame,
+    SpatialRod,
+    Structure,
+    Truss,
+)
 from oracles.specimens import LINKS, Specimen, specimens  # noqa: E402
 
 SPECIMENS = specimens(fine=True)
@@ -63,8 +72,17 @@ RANGES = {
 AROUND = 0.4
 DIMENSIONS, INTERVALS = (1, 2, 2, 2, 2, 2, 2, 2, 2, 3), {1: (20, 200), 2: (4, 18), 3: (2, 4)}
 """Numbers of free parameters to choose from, and fewest and most intervals along each."""
-CAPS, ANGLES, SHORTENINGS, HALF = (8.0, 24.0), (1.5, 3.5), (0.05, 0.5), 0.5
-"""Bounds of curvature, of the angles of a chain (which may wind for ever), and of shortenings."""
+CAPS = {
+    "frame of two members": (4.0, 16.0),
+    "frame": (2.0, 5.0),
+    "frame, inextensible in part": (2.0, 5.0),
+    "everything in a frame in space": (1.0, 3.0),
+    "bend in space": (4.0, 12.0),
+}
+"""Bounds of the curvature of frames, by name of the specimen."""
+CAPS_OF_RODS = (8.0, 24.0)
+ANGLES, SHORTENINGS, HALF = (1.5, 3.5), (0.05, 0.5), 0.5
+"""Bounds of the angles of a chain (which may wind for ever), and of shortenings."""
 WIDE, MOST = 0.5, 0.7
 """Share of boxes that are wide, and the part of the ranges of their parameters that these cover at
 least."""
@@ -76,7 +94,8 @@ SYMMETRIC = 0.3
 class Question:
     """A set to be lifted."""
 
-    specimen: Specimen
+    name: str
+    structure: Structure
     box: Box
     fixed: dict[str, float]
     within: tuple[Constraint, ...]
@@ -119,12 +138,23 @@ def _range(specimen: Specimen, name: str) -> tuple[float, float]:
     return centre - AROUND, centre + AROUND
 
 
-def _within(specimen: Specimen, generator: np.random.Generator) -> tuple[Constraint, ...]:
-    """Cap of the curvature, of the angles of a chain, for half of the trusses of shortenings."""
+def _bounded(
+    specimen: Specimen, generator: np.random.Generator
+) -> tuple[Structure, tuple[Constraint, ...]]:
+    """The structure under a cap of its curvature, with the elements that this needs, or others.
+
+    Else a cap of the angles of a chain, or for half of the trusses of shortenings.
+    """
+    structure, share = specimen.structure, generator.random()
+    if isinstance(structure, Rod | SpatialRod | Frame | SpatialFrame):
+        bound = round(_share(CAPS.get(specimen.name, CAPS_OF_RODS), share), 2)
+        fine = structure.resolving(bound)
+        return fine, (fine.max_curvature <= bound,)
+    return structure, _within(specimen, share)
+
+
+def _within(specimen: Specimen, share: float) -> tuple[Constraint, ...]:
     structure = specimen.structure
-    share = generator.random()
-    if hasattr(structure, "max_curvature"):
-        return (structure.max_curvature <= round(_share(CAPS, share), 2),)
     if specimen.name.startswith("chain"):
         if share < HALF:
             return ()
@@ -162,17 +192,17 @@ def question(number: int) -> Question:
         zero = low <= 0.0 <= high and generator.random() < SYMMETRIC
         if name not in sides:
             fixed[name] = 0.0 if zero else round(generator.uniform(low, high), 4)
-    within = _within(specimen, generator)
+    structure, within = _bounded(specimen, generator)
     fewest, most = INTERVALS[d]
     intervals = tuple(generator.integers(fewest, most + 1, d).tolist())
-    return Question(specimen, Box(**sides), fixed, within, intervals)
+    return Question(specimen.name, structure, Box(**sides), fixed, within, intervals)
 
 
 def outcome(asked: Question) -> tuple[str, int]:
     """Whether a set is clean, or what fails; and its vertices."""
     try:
         eset = equilibrium_set(
-            asked.specimen.structure,
+            asked.structure,
             asked.box,
             fixed=asked.fixed,
             within=list(asked.within),
@@ -206,7 +236,7 @@ def run(numbers: Iterable[int]) -> Iterable[str]:
             said, vertices = f"error: {type(error).__name__}: {error}", 0
         spent = time.process_time() - start
         yield "\t".join(
-            [str(number), asked.specimen.name, said, str(vertices), f"{spent:.1f} s",
+            [str(number), asked.name, said, str(vertices), f"{spent:.1f} s",
              f"{memory()} MB", str(asked)]
         )  # fmt: skip
 

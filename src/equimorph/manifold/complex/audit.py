@@ -46,7 +46,7 @@ class Audit:
 
     Vertices that the discretisation does not resolve (`unresolved`) belong to a set where curves
     lead to them; the searches found `left_out` others, which it lacks, and which must be zero, too:
-    a finer discretisation finds them, or a constraint excludes them.
+    finer elements resolve them (`Rod.resolving`), or a constraint excludes them.
 
     `stopped`, which must be zero, is the number of equilibria at which lifting stopped because it
     exceeded the limit; much is unpaired and undecided then.
@@ -206,7 +206,7 @@ class Audit:
         found = f", and {self.left_out} states found besides, which are left out"
         return (
             f"{self.unresolved} vertices{found if self.left_out else ''}; of such states any "
-            "number may be missing: refine the discretisation, or exclude them by a constraint"
+            "number may be missing: take more elements (`resolving`), or exclude them by a constraint"
         )
 
     @property

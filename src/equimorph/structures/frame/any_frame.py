@@ -22,6 +22,7 @@ from equimorph.model import (
 from equimorph.structures.collapse import Shortening
 from equimorph.structures.frame.strength import StressedFrame
 from equimorph.structures.network import direction_of_mechanism
+from equimorph.structures.resolution import Refinable
 from equimorph.structures.rod.discretisation import error_by_refinement
 from equimorph.structures.vibration import MaterialPoints
 from equimorph.tolerances import SINGULAR
@@ -53,7 +54,7 @@ class Stretch(NamedTuple):
     shares: np.ndarray
 
 
-class AnyFrame(StressedFrame, Shortening):
+class AnyFrame(StressedFrame, Shortening, Refinable):
     """A frame: what its model says in the units of its user, and what is drawn of it."""
 
     stations: ClassVar[int]
@@ -65,10 +66,16 @@ class AnyFrame(StressedFrame, Shortening):
         """Names and scales of parameters; refuse frames that are not sound."""
         model = self.model
         self.network, self.system = model.network, model.system
+        self.resolution = model.mesh.elements, model.mesh.degree
         self.energy_scale, self.displacement_unit = model.energy, model.length
         self._set_parameters(model.patterns.length * model.length)
         self._refuse_singular()
         self._set_scales()
+
+    @property
+    def longest_piece(self) -> float:
+        """Length of the longest piece of a member."""
+        return float(self.model.network.lengths.max())
 
     def quantity(self, k: int) -> str:
         """What a parameter measures; "1" if it has several kinds of effects."""

@@ -18,6 +18,7 @@ from equimorph.structures.frame.images import PlanarImage, find_images
 from equimorph.structures.frame.model import FrameModel
 from equimorph.structures.frame.network import AXES, MemberSpec, SupportSpec, frame_network
 from equimorph.structures.network import Joints
+from equimorph.structures.resolution import SMALLEST_WAVE
 from equimorph.structures.stress import Stressed
 from equimorph.structures.unit_system import Units, unit_system
 
@@ -25,6 +26,7 @@ from equimorph.structures.unit_system import Units, unit_system
 class DescribedFrame(FrameFields):
     """A planar frame with its descriptors, in the user's units."""
 
+    smallest_wave: ClassVar[float] = SMALLEST_WAVE
     written: ClassVar[Written] = {
         "displacement(joint,axis)": "displacement",
         "rotation(joint)": "rotation",
@@ -175,7 +177,7 @@ class Frame(DescribedFrame):
         changes intrinsic curvatures, "length" the members' lengths, "move" places of supports
         (x, y) and "turn" their angles.
     elements, degree
-        Elements of each member and their polynomial degree.
+        Elements of each member and their polynomial degree; see `resolving`.
     units
         Units of force and length of all numbers, like ``{"force": "kN", "length": "mm"}``; places,
         stiffnesses and weights may then be texts with units. None: any one system.

@@ -348,10 +348,18 @@ class FrameMechanics(DiscreteStructure):
     def resolved(self, z: Lanes, p: Parameters) -> Flags:
         """Whether the highest Legendre coefficients of ψ are small in every element.
 
-        What nothing keeps from turning is the same after a whole turn: less than half of one
-        counts.
+        Of states that are the same but for whole turns, those that turn least; see `may_resolve`.
         """
         psi = self.turns(z, self.scalars(z, p))
         tail = np.abs(psi[:, self.model.nodes] @ self.model.mesh.reference.to_legendre[-2:].T)
-        whole = np.abs(psi[:, self._turning]).max(axis=1, initial=0.0) <= np.pi
-        return np.asarray((tail.max(axis=(1, 2)) < RESOLVED) & whole)
+        return np.asarray((tail.max(axis=(1, 2)) < RESOLVED) & self._turn_least(psi))
+
+    def may_resolve(self, z: Lanes, p: Parameters) -> Flags:
+        """Whether parts that nothing keeps from turning have turned by half a turn at most.
+
+        They are the same after a whole turn: others are no states that a set lacks.
+        """
+        return self._turn_least(self.turns(z, self.scalars(z, p)))
+
+    def _turn_least(self, psi: Float[np.ndarray, "lanes nodes"]) -> Flags:
+        return np.asarray(np.abs(psi[:, self._turning]).max(axis=1, initial=0.0) <= np.pi)

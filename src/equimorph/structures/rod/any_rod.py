@@ -24,6 +24,7 @@ from equimorph.structures.equations import (
     LinearSystem,
     Shift,
 )
+from equimorph.structures.resolution import Refinable
 from equimorph.structures.rod.centreline import Centreline, closest_approach, stations
 from equimorph.structures.rod.discretisation import Mesh
 from equimorph.structures.rod.inertia import HeavyRod
@@ -84,7 +85,7 @@ def arclengths(s: Arclengths | None) -> Arclengths:
     return np.linspace(0.0, 1.0, 101) if s is None else np.asarray(s, dtype=float)
 
 
-class AnyRod(HeavyRod):
+class AnyRod(HeavyRod, Refinable):
     """A rod: mechanics in non-dimensional numbers inside, the user's units outside.
 
     Unknowns, multipliers, residuals and energies are non-dimensional; parameters, shapes and
@@ -108,6 +109,11 @@ class AnyRod(HeavyRod):
     def mesh(self) -> Mesh:
         """Elements along the rod."""
         return self.mechanics.mesh
+
+    @property
+    def longest_piece(self) -> float:
+        """Length of the rod."""
+        return self.units.value("length")
 
     @property
     def section(self) -> SectionProperties | None:

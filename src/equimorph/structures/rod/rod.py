@@ -11,6 +11,7 @@ from equimorph.arrays import Flags, Float, Lanes, Parameters, Values
 from equimorph.errors import InputError
 from equimorph.model import Drawing, Parameter
 from equimorph.structures.contract import Growth
+from equimorph.structures.resolution import SMALLEST_WAVE
 from equimorph.structures.rod.any_rod import AnyRod
 from equimorph.structures.rod.clamped import ClampedMechanics
 from equimorph.structures.rod.description import PlanarDescription
@@ -94,7 +95,8 @@ class Rod(Described):
         Arclengths at which a callable Q, stiffness or curvature is not smooth.
     elements, degree
         Resolution: the default, six elements of degree 9, keeps limit loads, heights and
-        curvature within 1e-8 for max |κ| ≤ 10; `error_estimate` bounds what it loses beyond.
+        curvature within 1e-8 for max |κ| ≤ 10; `error_estimate` bounds what it loses beyond, and
+        `resolving` takes as many elements as a larger bound needs.
     ends
         Ends A and B: "clamped", "pinned", "free", "sliding" (angle and y are held), or an `End`,
         also one that rolls along an inclined line: ``End("free", slide=0.5)``; the line's distance
@@ -156,6 +158,7 @@ class Rod(Described):
     """
 
     kind: ClassVar[str] = "rod"
+    smallest_wave: ClassVar[float] = SMALLEST_WAVE
 
     @check_arguments
     def __init__(  # noqa: PLR0913  # what a rod can have
@@ -189,7 +192,7 @@ class Rod(Described):
         number = self.units.number
         stretched: ProfileSpec | None = number(axial, "force", "axial")
         curved: ProfileSpec = number(curvature, "1/length", "curvature")
-        self._resolution, self._breaks = (elements, degree), breaks
+        self.resolution, self._breaks = (elements, degree), breaks
         shape = "uniform" if load is None and loads is None else load
         self._load = None if shape is None else load_shape(shape, kinks)
         self._general: PlanarDescription | None = None
@@ -220,7 +223,7 @@ class Rod(Described):
             check_terms(self.terms)
 
     def _become_arch(self, load: LoadShape, span: float) -> None:
-        elements, degree = self._resolution
+        elements, degree = self.resolution
         kinks = np.union1d(load.kinks, self._breaks)
         self._use_mechanics(ClampedMechanics(mesh_with_kinks(kinks, elements, degree), load))
         self.parameters = (
@@ -256,12 +259,12 @@ class Rod(Described):
                     "Sample it into a table [[s, Q], ...]."
                 )
             data = {"load": self._load.identity, "span": self.parameters[3].default}
-        return self._complete_identity(data, self._resolution)
+        return self._complete_identity(data, self.resolution)
 
     @cached_property
     def refined(self) -> PlanarMechanics:
         """The same rod with elements of a degree higher by four."""
-        elements, degree = self._resolution
+        elements, degree = self.resolution
         degree = min(degree + 4, 16)
         if self._general is not None:
             raw = self._general.raw_model(elements, degree)
@@ -280,7 +283,7 @@ class Rod(Described):
     def _raw(self) -> GeneralMechanics:
         """Mechanics of a general rod in the raw parameters."""
         assert self._general is not None
-        return GeneralMechanics(self._general.raw_model(*self._resolution))
+        return GeneralMechanics(self._general.raw_model(*self.resolution))
 
     def natural(self, p: Parameters) -> tuple[Lanes, Flags]:
         """Unloaded rod, continued from its stress-free shape."""
@@ -364,4 +367,4 @@ class Rod(Described):
         """Its Lagrangian; that of the arch as of a general rod with a rise."""
         if isinstance(self.mechanics, GeneralMechanics):
             return self.mechanics.model
-        return self.description.in_own_parameters(self.description.raw_model(*self._resolution))
+        return self.description.in_own_parameters(self.description.raw_model(*self.resolution))

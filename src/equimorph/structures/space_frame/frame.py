@@ -17,6 +17,7 @@ from equimorph.structures.frame.any_model import Actuators, Loads, Patterns
 from equimorph.structures.frame.images import SpatialImage, find_images
 from equimorph.structures.network import Joints
 from equimorph.structures.newton import newton
+from equimorph.structures.resolution import SMALLEST_IN_SPACE
 from equimorph.structures.space_frame.fields import SpatialFrameFields
 from equimorph.structures.space_frame.mechanics import SpatialFrameMechanics
 from equimorph.structures.space_frame.member import SpatialMemberSpec, SpatialSupportSpec
@@ -84,6 +85,7 @@ SECTION = ("t", "n", "b")
 class DescribedSpatialFrame(SpatialFrameFields):
     """A frame in space with its descriptors, in the user's units."""
 
+    smallest_wave: ClassVar[float] = SMALLEST_IN_SPACE
     written: ClassVar[Written] = {
         "displacement(joint,axis)": "displacement",
         "place(joint,axis)": "place",
@@ -265,7 +267,7 @@ class SpatialFrame(DescribedSpatialFrame):
         one after the other), "length" changes the members' lengths, and "curvature" their
         intrinsic strains (twist, curvature about n, curvature about b).
     elements, degree
-        Elements of each piece of a member and their polynomial degree.
+        Elements of each piece of a member and their polynomial degree; see `resolving`.
     units
         Units of force and length of all numbers, like ``{"force": "kN", "length": "mm"}``; places,
         stiffnesses and weights may then be texts with units. None: any one system.

@@ -11,6 +11,7 @@ from equimorph.arrays import Flags, Float, Lanes, Parameters, Values
 from equimorph.errors import InputError
 from equimorph.model import Drawing, parameter_vector
 from equimorph.structures.discrete import correct_at_parameters
+from equimorph.structures.resolution import SMALLEST_IN_SPACE
 from equimorph.structures.rod.discretisation import ElementCount
 from equimorph.structures.rod.drawing import ENDS, rod_drawing, rod_supports
 from equimorph.structures.rod.mechanics import SAMPLES, discretisation_error
@@ -97,6 +98,7 @@ class SpatialRod(DescribedInSpace):
         Arclengths at which a callable is not smooth.
     elements, degree
         Resolution: the default, six elements of degree 6, gives critical loads of the arch to 3e-9.
+        `resolving` takes as many elements as a bound of the curvature needs.
     EI, length, units, mass
         As of `Rod`. The mass lies on the centre line: cross-sections have no rotary inertia.
 
@@ -124,6 +126,7 @@ class SpatialRod(DescribedInSpace):
     """
 
     kind: ClassVar[str] = "spatial rod"
+    smallest_wave: ClassVar[float] = SMALLEST_IN_SPACE
 
     @check_arguments
     def __init__(  # noqa: PLR0913  # what a rod can have
@@ -164,7 +167,7 @@ class SpatialRod(DescribedInSpace):
         if shape is not None:
             load_shape(shape, kinks)
         reach = DEFAULT_SPAN * self.units.value("length")
-        self._resolution = (elements, degree)
+        self.resolution = (elements, degree)
         profiles = {
             "stiffness": stiffness,
             "curvature": number(curvature, "1/length", "curvature"),
@@ -207,14 +210,14 @@ class SpatialRod(DescribedInSpace):
 
     def identity(self) -> dict[str, Any]:
         """Kind, resolution, and everything that differs from the default."""
-        return self._complete_identity(self.description.data(), self._resolution)
+        return self._complete_identity(self.description.data(), self.resolution)
 
     # --- natural states -------------------------------------------------------------------------
 
     @cached_property
     def _raw(self) -> SpatialMechanics:
         """Mechanics in the raw parameters."""
-        return SpatialMechanics(self.description.raw_model(*self._resolution))
+        return SpatialMechanics(self.description.raw_model(*self.resolution))
 
     def natural(self, p: Parameters) -> tuple[Lanes, Flags]:
         """Unloaded rod, continued from its stress-free shape."""
@@ -320,7 +323,7 @@ class SpatialRod(DescribedInSpace):
 
     @cached_property
     def _refined(self) -> SpatialMechanics:
-        elements, degree = self._resolution
+        elements, degree = self.resolution
         raw = self.description.raw_model(elements, min(degree + 4, 16))
         return self.description.mechanics(raw)
 

@@ -1,0 +1,78 @@
+"""Elements for a bound of the curvature; what finer elements do not resolve either."""
+
+import numpy as np
+import pytest
+
+from equimorph import Box, Frame, Rod, SpatialRod, equilibrium_set
+from equimorph.structures.resolution import TAIL, turn_of_element
+from equimorph.structures.rod.discretisation import reference_element
+from oracles.specimens import toggle
+
+
+@pytest.mark.parametrize("wave", [0.4, 0.8])
+@pytest.mark.parametrize("degree", [4, 6, 8, 9, 12])
+def test_waves_as_curved_as_the_bound_are_resolved_by_an_element_and_not_by_a_longer_one(
+    degree, wave
+):
+    """A sin(ks + φ) with κ = Ak at the nodes; the bound is the first term of a Bessel function."""
+    element, phase = reference_element(degree), np.linspace(0.0, np.pi, 33)[:, None]
+
+    def tail(turn):
+        angle = wave * np.sin(turn / wave * (element.nodes - 0.5) + phase)
+        return np.abs(angle @ element.to_legendre[-2:].T).max()
+
+    turn = turn_of_element(degree, wave)
+    assert tail(turn) <= TAIL
+    assert tail(1.25 * turn) > TAIL
+
+
+def test_structures_keep_all_but_their_elements():
+    """Functions, defaults and degrees stay; a bound that the elements resolve changes nothing."""
+    rod = Rod(lambda s: 1.0 + s, span=0.7, degree=8)
+    fine = rod.resolving(24.0)
+    assert fine.resolution == (14, 8)
+    assert [each.default for each in fine.parameters] == [each.default for each in rod.parameters]
+    assert rod.resolving(1.0).resolution == rod.resolution == (6, 8)
+    assert SpatialRod(torsion=0.77, lateral=1.4).resolving(20.0).resolution == (13, 6)
+
+
+def test_lengths_count_in_the_units_of_the_bound():
+    """A rod of half a metre turns by as much under twice the bound."""
+    rod = Rod(EI=1.0, length=0.5)
+    assert rod.resolving(40.0).resolution == Rod().resolving(20.0).resolution
+
+
+def test_a_set_lacks_no_states_with_elements_for_its_bound():
+    """Two stiff members between clamps: their waves are short long before they are curved."""
+    coarse, bound = toggle(elements=2, degree=8), 8.0
+    left_out = []
+    for frame in (coarse, coarse.resolving(bound)):
+        eset = equilibrium_set(
+            frame,
+            Box(a=(-0.5, -0.4)),
+            fixed={"P": 0.0},
+            within=[frame.max_curvature <= bound],
+            intervals=(4,),
+        )
+        left_out.append(eset.audit.left_out)
+    assert left_out[0] > 0
+    assert left_out[1] == 0
+
+
+def test_states_that_differ_by_whole_turns_are_one():
+    """A strut between hinges turned by 2π is in equilibrium as before; a set does not lack it."""
+    frame = Frame(
+        {"A": (0, 0), "B": (0, 1), "C": (1, 1)},
+        [("A", "B"), {"ends": ("B", "C"), "hinges": ["B", "C"]}],
+        {"A": "fixed", "C": "xy"},
+        {"P": {"B": (0.0, -1.0)}},
+    )
+    state = frame.natural_state()
+    turned = state.z[None].copy()
+    places = frame.model.place[frame.model.piece_nodes[1]]
+    turned[:, places[places >= 0]] += 2.0 * np.pi
+    p = state.p[None]
+    assert np.abs(frame.residual(turned, p)).max() < 1e-12
+    both = np.concatenate([state.z[None], turned]), np.repeat(p, 2, axis=0)
+    np.testing.assert_array_equal(frame.resolved(*both), [True, False])
+    np.testing.assert_array_equal(frame.may_resolve(*both), [True, False])
