@@ -206,7 +206,7 @@ class Audit:
         found = f", and {self.left_out} states found besides, which are left out"
         return (
             f"{self.unresolved} vertices{found if self.left_out else ''}; of such states any "
-            "number may be missing: take more elements (`resolving`), or exclude them by constraints"
+            "number may be missing: take more elements (`resolving`), or bound the set below them"
         )
 
     @property
