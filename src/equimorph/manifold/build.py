@@ -99,7 +99,7 @@ def equilibrium_set(  # noqa: PLR0913  # the knobs of the public face, most by k
         search looks for equilibria that the set lacks; four times as many in diagrams over one
         parameter and in symmetric slices. In addition, Newton's method starts from 2000 random
         states, each over a different point. Equilibria found in this way are lifted like seeds and
-        new points are checked, until nothing is missing or ten rounds are over. None disables all
+        new points are checked, until nothing is missing or ten rounds are over. 0 disables all
         checks.
     accuracy
         Largest distance of the straight cells from the set, in the metric, to which the set is
