@@ -8,6 +8,7 @@ from scipy.sparse.csgraph import breadth_first_order, dijkstra, maximum_flow
 from scipy.spatial import cKDTree
 
 from equimorph.arrays import Bool, Float, Int, Pairs
+from equimorph.charts.kernels import overlap_flags
 from equimorph.charts.location import Cells
 from equimorph.manifold.geometry.topology import labels
 from equimorph.manifold.lookup.cell_index import CellIndex
@@ -62,22 +63,12 @@ def overlapping(cells: Cells) -> Pairs:
     plain = np.flatnonzero(cells.turn * np.sign(cells.turn.sum()) > 0.0)
     corners, vertices = (values / size)[plain], cells.corners[plain]
     if corners.shape[2] == 2:
-        a, b = _near_pairs(corners).T
+        pairs, inward = _near_pairs(corners), _inward(corners)
     else:
         hits = CellIndex.of(corners, np.zeros(len(corners))).near(corners.mean(axis=1))
-        a, b = hits.point[hits.inside], hits.cell[hits.inside]
-    apart = np.ones(len(a), bool)
-    for one in vertices.T:
-        for other in vertices.T:
-            apart &= one[a] != other[b]
-    a, b = a[apart], b[apart]
-    inward = _inward(corners) if corners.shape[2] == 2 else np.zeros((0, 0, 2))
-    for k in range(2 * inward.shape[1]):
-        one, other, side = (a, b, k) if k < 3 else (b, a, k - 3)
-        normal, at = inward[one, side], corners[other] - corners[one, side][:, None]
-        deep = np.einsum("nd,nkd->nk", normal, at).max(axis=1) > TOUCHING
-        a, b = a[deep], b[deep]
-    return np.stack([plain[a], plain[b]], axis=1)
+        pairs = np.stack([hits.point[hits.inside], hits.cell[hits.inside]], axis=1)
+        inward = np.zeros((0, 0, 2))
+    return plain[pairs[overlap_flags(pairs, vertices, corners, inward, TOUCHING)]]
 
 
 def _inward(corners: Float[np.ndarray, "C 3 2"]) -> Float[np.ndarray, "C 3 2"]:
