@@ -24,7 +24,7 @@ def common_area(one, other):
 
 
 def test_triangles_overlap_where_they_have_an_area_in_common():
-    """Random triangles, of which some touch along a side; those with a common vertex do not count."""
+    """Random ones, of which some touch along a side; those with a common vertex do not count."""
     generator = np.random.default_rng(2)
     corners = generator.uniform(0.0, 3.0, (60, 1, 2)) + generator.uniform(-0.6, 0.6, (60, 3, 2))
     corners[1] = corners[0] + 2.0 * (corners[0, 1] - corners[0, 0])

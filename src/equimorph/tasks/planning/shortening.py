@@ -23,6 +23,7 @@ from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.geometry.setting import embed
 from equimorph.structures import States
 from equimorph.structures.margin import softest_modes
+from equimorph.tasks.planning.corner_moves import chords
 from equimorph.tasks.planning.curves import (
     Curves,
     CurveSteps,
@@ -79,16 +80,13 @@ class Shortener:
 
         Walls are as weak as lifts of all legs allow; None where they never do.
         """
-        starts = [self._curve_along(path, NODES) for path in paths]
-        found: list[Curves | None] = [None] * len(paths)
-        for last in range(len(STRENGTHS), 0, -1):
-            todo = {
-                k: start for k, start in enumerate(starts) if start is not None and found[k] is None
-            }
-            linked = self._linked(list(todo.values()), STRENGTHS[:last]) if todo else []
-            for k, curve in zip(todo, linked, strict=True):
-                found[k] = curve
-        return [None if curve is None else self._steps.states(curve) for curve in found]
+        starts = {k: self._curve_along(path, NODES) for k, path in enumerate(paths)}
+        todo = {k: start for k, start in starts.items() if start is not None}
+        found = dict[int, Curves]()
+        todo = self._link(todo, STRENGTHS, found) if todo else todo
+        for strength in STRENGTHS[-2::-1]:
+            todo = self._link(todo, (strength,), found) if todo else todo
+        return [self._steps.states(found[k]) if k in found else None for k in range(len(paths))]
 
     def rough_lengths(self, paths: Sequence[States]) -> list[float]:
         """Lengths of shortened curves of few nodes near paths; infinite without one."""
@@ -128,32 +126,37 @@ class Shortener:
         place = embed(self._steps.setting, states.z, states.p)
         return np.asarray(np.linalg.norm(np.diff(place, axis=0), axis=1))
 
-    def _linked(self, curves: list[Curves], strengths: tuple[float, ...]) -> list[Curves | None]:
-        """Shortened curves all of whose legs can be lifted; None where none was found.
+    def _link(
+        self, todo: dict[int, Curves], strengths: tuple[float, ...], found: dict[int, Curves]
+    ) -> dict[int, Curves]:
+        """Enter shortened curves all of whose legs can be lifted; return the others.
 
         Legs that cannot, or whose lifts are longer, are divided.
         """
-        found: list[Curves | None] = [None] * len(curves)
-        todo = dict(enumerate(curves))
+        left = dict[int, Curves]()
         for _ in range(DIVISIONS):
             shorter = self._shorten(list(todo.values()), strengths)
-            left = {}
-            for k, curve, (linked, good) in zip(todo, shorter, self._lifts(shorter), strict=True):
+            curves, todo, strengths = zip(todo, shorter, strict=True), {}, strengths[-1:]
+            for (k, curve), (linked, good) in zip(curves, self._lifts(shorter), strict=True):
                 if linked:
                     found[k] = curve
                 divided = None if good.all() else self._divided(curve, good)
                 if divided is not None:
-                    left[k] = divided
-            todo, strengths = left, strengths[-1:]
+                    todo[k] = divided
+                else:
+                    left[k] = curve
             if not todo:
                 break
-        return found
+        return {k: curve for k, curve in (left | todo).items() if k not in found}
 
     def _lifts(self, curves: list[Curves]) -> list[tuple[bool, Flags]]:
         """Whether all legs of each curve can be lifted, and which of them are as long as lifts."""
         every, count = join_curves(curves), len(curves)
         states, ends = self._steps.states(every), every.legs
-        linked, cost = connect(states[ends - 1], states[ends], self._closely)
+        linked, cost = chords(states, ends - 1, ends, self._closely)
+        some = np.flatnonzero(linked)
+        lifts = connect(states[ends[some] - 1], states[ends[some]], self._closely)
+        linked[some], cost[some] = lifts
         place = embed(self._steps.setting, every.z, every.p)
         chord = np.linalg.norm(place[ends] - place[ends - 1], axis=1)
         length = every.sums(chord, ends, count)
