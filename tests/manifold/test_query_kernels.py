@@ -8,7 +8,13 @@ import equimorph as em
 from equimorph.equilibria import Guards, settle
 from equimorph.manifold.lookup.cell_index import NUDGE, CellIndex
 from equimorph.manifold.lookup.exact_states import CLOSEST, ROUND_OFF, exact_states, root_weights
-from equimorph.manifold.lookup.kernels import balanced, guesses, one_of_each, worth_trying
+from equimorph.manifold.lookup.kernels import (
+    balanced,
+    cells_by_bin,
+    guesses,
+    one_of_each,
+    worth_trying,
+)
 from equimorph.structures import Spring
 
 
@@ -153,3 +159,15 @@ def test_exact_states_do_not_depend_on_those_beside_them():
         assert all(
             np.array_equal(one[0], all_[k]) for one, all_ in zip(alone, together, strict=True)
         )
+
+
+@pytest.mark.parametrize("counts", [(7,), (5, 4), (3, 4, 2)])
+def test_cells_are_listed_in_each_bin_that_they_reach(counts):
+    """Against a plain search of all cells for each bin."""
+    generator, d = np.random.default_rng(len(counts)), len(counts)
+    first = generator.integers(0, counts, (30, d))
+    last = np.minimum(first + generator.integers(0, 3, (30, d)), np.array(counts) - 1)
+    starts, cells = cells_by_bin(first, last, np.array(counts))
+    for number, place in enumerate(np.ndindex(*counts)):
+        wanted = np.flatnonzero(((first <= place) & (place <= last)).all(axis=1))
+        np.testing.assert_array_equal(cells[starts[number] : starts[number + 1]], wanted)

@@ -8,7 +8,7 @@ from equimorph.arrays import Bool, Float, Int, Items, Place, Places
 from equimorph.columns import Columns
 from equimorph.manifold.geometry.simplices import volumes
 from equimorph.manifold.geometry.topology import Adjacency, keys_of
-from equimorph.manifold.lookup.kernels import cells_near
+from equimorph.manifold.lookup.kernels import cells_by_bin, cells_near
 
 MOST_BINS = 4
 """Bins per cell, at most."""
@@ -90,7 +90,7 @@ class CellIndex:
             np.clip((side * counts).astype(int), 0, counts - 1)
             for side in (low - room, high + room)
         )
-        starts, cells = _cells_by_bin(first, last, counts)
+        starts, cells = cells_by_bin(first, last, counts)
         return cls(lower, width, counts, starts, cells, _maps(unit), overhang)
 
     def near(self, points: Places) -> Hits:
@@ -129,28 +129,6 @@ def _maps(unit: Float[np.ndarray, "C corners d"]) -> Float[np.ndarray, "C corner
         maps = np.linalg.inv(np.swapaxes(homogeneous, 1, 2))
     maps[flat] = np.nan
     return np.asarray(maps)
-
-
-def _cells_by_bin(
-    first: Int[np.ndarray, "C d"], last: Int[np.ndarray, "C d"], counts: Int[np.ndarray, " d"]
-) -> tuple[Int[np.ndarray, " bins_and_one"], Int[np.ndarray, " entries"]]:
-    """Cells by bin, from the ranges of bins that they reach."""
-    spread = last - first + 1
-    number = spread.prod(axis=1)
-    cells_of = np.repeat(np.arange(len(first)), number)
-    step, bins_of = _ranges(np.zeros_like(number), number), np.zeros(len(cells_of), int)
-    for k in reversed(range(len(counts))):
-        step, along = np.divmod(step, spread[cells_of, k])
-        bins_of += (first[cells_of, k] + along) * int(counts[k + 1 :].prod())
-    order = np.argsort(bins_of, kind="stable")
-    filled = np.bincount(bins_of, minlength=int(counts.prod()))
-    return np.concatenate([[0], np.cumsum(filled)]), cells_of[order]
-
-
-def _ranges(start: Items, number: Items) -> Int[np.ndarray, " m"]:
-    """Numbers from each start on, one range after the other."""
-    before = np.cumsum(number) - number
-    return np.asarray(np.arange(int(number.sum())) + np.repeat(start - before, number))
 
 
 BEND, STEEPEST = 0.25, np.radians(75.0)

@@ -9,6 +9,46 @@ ACCURATE = {"nogil": True, "error_model": "numpy"}
 
 
 @njit(**ACCURATE)
+def cells_by_bin(first, last, counts):
+    """Where the cells of each bin begin, and these, in the order of their numbers.
+
+    first, last (C, d): ranges of bins along each parameter that a cell reaches; counts (d,): bins
+    along each. Bins are numbered with the last parameter the fastest.
+    """
+    cells, d = first.shape
+    stride, bins = np.ones(d, np.int64), 1
+    for k in range(d - 1, -1, -1):
+        stride[k] = bins
+        bins *= counts[k]
+    starts, place = np.zeros(bins + 1, np.int64), np.empty(d, np.int64)
+    for fill in range(2):
+        if fill:
+            starts[1:] = np.cumsum(starts[1:])
+            found, free = np.empty(starts[bins], np.int64), starts[:-1].copy()
+        for c in range(cells):
+            number = 0
+            for k in range(d):
+                place[k] = first[c, k]
+                number += place[k] * stride[k]
+            while True:
+                if fill:
+                    found[free[number]] = c
+                    free[number] += 1
+                else:
+                    starts[number + 1] += 1
+                k = d - 1
+                while k >= 0 and place[k] == last[c, k]:
+                    number -= (place[k] - first[c, k]) * stride[k]
+                    place[k] = first[c, k]
+                    k -= 1
+                if k < 0:
+                    break
+                place[k] += 1
+                number += stride[k]
+    return starts, found
+
+
+@njit(**ACCURATE)
 def cells_near(points, bins, maps, overhang, nudge):
     """Pairs of a point and a cell near it; see `CellIndex.near`.
 
