@@ -14,7 +14,6 @@ from equimorph.equilibria.settle import Guards, Settled, embedded_planes, free_d
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet, Level, level_set
 from equimorph.manifold.complex.kept_tables import from_cache, places_of
-from equimorph.manifold.complex.marked_complex import squared_sides
 from equimorph.manifold.geometry.setting import Setting, embed
 from equimorph.manifold.geometry.topology import faces_of, pieces
 from equimorph.manifold.lookup.cell_index import CellIndex, Hits
@@ -120,9 +119,8 @@ class Predictor:
     @cached_property
     def _sizes(self) -> Float[np.ndarray, " C"]:
         """Longest side of each cell from its first corner."""
-        first = len(self.eset.names)  # pairs with the first corner come first
-        squared = squared_sides(places_of(self.eset), self.eset.cells)[:, :first]
-        return np.asarray(np.sqrt(squared.max(axis=1)))
+        places, (first, *rest) = places_of(self.eset), self.eset.cells.T
+        return np.max([np.linalg.norm(places[c] - places[first], axis=1) for c in rest], axis=0)
 
     @cached_property
     def _sides(self) -> Int[np.ndarray, " C"]:
