@@ -68,7 +68,8 @@ def overlapping(cells: Cells) -> Pairs:
         hits = CellIndex.of(corners, np.zeros(len(corners))).near(corners.mean(axis=1))
         pairs = np.stack([hits.point[hits.inside], hits.cell[hits.inside]], axis=1)
         inward = np.zeros((0, 0, 2))
-    return plain[pairs[overlap_flags(pairs, vertices, corners, inward, TOUCHING)]]
+    overlap = overlap_flags(pairs, vertices, corners, inward, TOUCHING)
+    return np.asarray(plain[pairs[overlap]])
 
 
 def _inward(corners: Float[np.ndarray, "C 3 2"]) -> Float[np.ndarray, "C 3 2"]:

@@ -120,7 +120,8 @@ class Predictor:
     def _sizes(self) -> Float[np.ndarray, " C"]:
         """Longest side of each cell from its first corner."""
         places, (first, *rest) = places_of(self.eset), self.eset.cells.T
-        return np.max([np.linalg.norm(places[c] - places[first], axis=1) for c in rest], axis=0)
+        sides = [np.linalg.norm(places[c] - places[first], axis=1) for c in rest]
+        return np.asarray(np.max(sides, axis=0))
 
     @cached_property
     def _sides(self) -> Int[np.ndarray, " C"]:
