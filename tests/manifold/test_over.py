@@ -5,6 +5,7 @@ import pytest
 
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet, equilibrium_set
+from equimorph.manifold.lookup.over import Sheets
 from equimorph.model import Box
 from equimorph.structures import Spring, States
 from oracles.surfaces import sphere, torus
@@ -213,3 +214,33 @@ def test_a_point_that_does_not_exist_ends_the_loop(spring_set):
     assert len(list(found)) == 2
     with pytest.raises(IndexError, match="2 points"):
         found[2]
+
+
+def test_states_over_one_point_are_asked_for_once(spring_set, monkeypatch):
+    """Of states that are no equilibria none is known; the set is searched at their one point."""
+    here = spring_set.at(x_l=0.8, F=0.01)[0]
+    z = here.z + np.linspace(0.01, 0.02, 20)[:, None]
+    strangers = States(here.structure, z, np.repeat(here.p[None], 20, axis=0))
+    asked, over = [], Sheets.over
+    monkeypatch.setattr(Sheets, "over", lambda self, p: asked.append(len(p)) or over(self, p))
+    known, cell = spring_set.holding(strangers)
+    assert asked == [1]
+    assert not known.any()
+    assert (cell == -1).all()
+
+
+def test_only_the_nearest_rims_of_a_point_are_crossed(spring_set, monkeypatch):
+    """Of all rims near a point as many as are allowed, at the least distances."""
+    sheets = spring_set._sheets
+    near = sheets.above.near(spring_set.coordinates[spring_set.folds[0].ravel()[:40]])
+    hit, corner = sheets._nearest_rims(near, np.ones(len(near.cell), bool))
+    monkeypatch.setattr("equimorph.manifold.lookup.over.RIMS", 1)
+    few, of_few = sheets._nearest_rims(near, np.ones(len(near.cell), bool))
+    away = np.abs(near.weights[hit, corner]) / np.linalg.norm(
+        sheets.above.maps[near.cell[hit], corner, :-1] / sheets.above.width, axis=1
+    )
+    assert len(few) < len(hit)
+    for h, c in zip(few, of_few, strict=True):
+        mine = near.point[hit] == near.point[h]
+        own = (hit == h) & (corner == c)
+        assert away[own] == away[mine].min()

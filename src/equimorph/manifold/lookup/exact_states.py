@@ -107,9 +107,12 @@ STRAIGHT_ON = TraceOptions(
 def lifts_across_folds(
     states: States, velocity: Points
 ) -> tuple[Float[np.ndarray, "some size"], Some]:
-    """States in which moves of the parameters end that turn back at a fold; which moves do."""
+    """States in which moves of the parameters end that turn back at a fold; which moves do.
+
+    Only where the energy is valid: beyond, paths may lead into a singularity in ever smaller steps.
+    """
     line = ParameterLine(states.structure, states.p.copy(), velocity)
-    outcome = trace(line, states.z.copy(), (), STRAIGHT_ON)
+    outcome = trace(line, states.z.copy(), states.structure.validity, STRAIGHT_ON)
     which = np.flatnonzero(outcome.code == EventCode.RETURNED)
     return outcome.z[which], which
 
