@@ -66,18 +66,26 @@ class _Places:
 
 
 def cheapest_place(
-    eset: EquilibriumSet, snap: Snap, before: State, after: State, demands: Demands
+    eset: EquilibriumSet,
+    snap: Snap,
+    ends: tuple[State, State],
+    demands: Demands,
+    known: SnapPlace | None = None,
 ) -> SnapPlace | None:
     """Place of a fold with the cheapest straight moves from one state there, and on to another.
 
-    Among the vertices of the fold; over two parameters also between the neighbours of the best one,
+    Among the vertices of the fold, and a known place: from states close to the fold straight moves
+    may lead to this one alone. Over two parameters also between the neighbours of the best one,
     which are divided again and again. None if straight moves lead over none of them.
     """
-    places = _price(eset, *_vertices(eset, snap, demands), (before, after), demands)
+    folds, landings = _vertices(eset, snap, demands)
+    if known is not None and len(landings):
+        folds, landings = _with_place(folds, landings, known)
+    places = _price(eset, folds, landings, ends, demands)
     for _ in range(ROUNDS if len(eset.names) == 2 else 0):
         if not np.isfinite(places.cost).any():
             return None
-        places = _price(eset, *_between(eset, places, demands), (before, after), demands)
+        places = _price(eset, *_between(eset, places, demands), ends, demands)
     return places.best() if len(places.cost) else None
 
 
@@ -89,6 +97,25 @@ def _vertices(eset: EquilibriumSet, snap: Snap, demands: Demands) -> tuple[SetPo
     nearest = np.abs(np.arange(len(ordered))[:, None] - known).argmin(axis=1)
     landings = join_states(eset.structure, [snap.landings[k].state for k in nearest])
     return _land(points_at_vertices(eset, ordered), landings, demands)
+
+
+def _with_place(folds: SetPoints, landings: States, known: SnapPlace) -> tuple[SetPoints, States]:
+    """Folds in order, and landings, with a known place between its neighbours."""
+    structure, fold = landings.structure, known.fold
+    moved = metric_length(structure, (folds.z - fold.z)[:, : structure.unknowns])
+    gap = np.hypot(moved, np.linalg.norm((folds.p - fold.p) / structure.scales, axis=1))
+    nearest = int(gap.argmin())
+    beside = np.concatenate([[np.inf], gap, [np.inf]])[nearest : nearest + 3]
+    at = nearest + int(beside[2] < beside[0])
+    z, p = np.insert(folds.z, at, fold.z, axis=0), np.insert(folds.p, at, fold.p, axis=0)
+    rows = np.insert(folds.rows, at, folds.rows[nearest], axis=0)
+    landed = known.landing
+    every = States(
+        structure,
+        np.insert(landings.z, at, landed.z, axis=0),
+        np.insert(landings.p, at, landed.p, axis=0),
+    )
+    return SetPoints(z, p, rows), every
 
 
 def _between(eset: EquilibriumSet, places: _Places, demands: Demands) -> tuple[SetPoints, States]:

@@ -284,7 +284,7 @@ def _crossing(
         (len(part) - 1, last),
         (len(part) - 1, min(1, last)),
     ):
-        place = cheapest_place(eset, snap, part[i], onward[j], demands)
+        place = cheapest_place(eset, snap, (part[i], onward[j]), demands)
         if place is not None:
             break
     else:
@@ -299,7 +299,8 @@ def _crossing(
         m = max(int(np.searchsorted(owed, 0.5 * owed[-1])), 1)
         before_now = least
         for k in np.unique(np.searchsorted(spent[:-1], np.array(SHARES) * spent[-1], "right") - 1):
-            nearer = cheapest_place(eset, snap, before[k], after[m], replace(demands, closely=True))
+            ends = before[k], after[m]
+            nearer = cheapest_place(eset, snap, ends, replace(demands, closely=True), place)
             if nearer is not None and spent[k] + nearer.cost + owed[-1] - owed[m] < least:
                 least = spent[k] + nearer.cost + owed[-1] - owed[m]
                 place, parts = nearer, (before[: k + 1], after[m:])
