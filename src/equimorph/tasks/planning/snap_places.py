@@ -10,7 +10,9 @@ from equimorph.equilibria.soft_modes import metric_length
 from equimorph.manifold import EquilibriumSet, Snap
 from equimorph.manifold.queries.nearest import Ground, SetPoints, points_at_vertices
 from equimorph.structures import State, States, join_states
+from equimorph.tasks.planning.mesh_paths import metric_places
 from equimorph.tasks.planning.network import MATCH, Demands, lift_straight
+from equimorph.tolerances import SAME_STATE
 
 BEYOND = 5e-4
 """How far beyond the fold the parameters go, in their scales, so that the structure does snap."""
@@ -100,22 +102,19 @@ def _vertices(eset: EquilibriumSet, snap: Snap, demands: Demands) -> tuple[SetPo
 
 
 def _with_place(folds: SetPoints, landings: States, known: SnapPlace) -> tuple[SetPoints, States]:
-    """Folds in order, and landings, with a known place between its neighbours."""
-    structure, fold = landings.structure, known.fold
-    moved = metric_length(structure, (folds.z - fold.z)[:, : structure.unknowns])
-    gap = np.hypot(moved, np.linalg.norm((folds.p - fold.p) / structure.scales, axis=1))
-    nearest = int(gap.argmin())
-    beside = np.concatenate([[np.inf], gap, [np.inf]])[nearest : nearest + 3]
-    at = nearest + int(beside[2] < beside[0])
+    """Folds in order, and landings, with a known place where it makes their chain least longer."""
+    structure, fold, landed = landings.structure, known.fold, known.landing
+    place = metric_places(States(structure, folds.z, folds.p))
+    gap = np.linalg.norm(place - metric_places(fold.batch), axis=1)
+    if gap.min() < SAME_STATE:
+        return folds, landings
+    longer = gap[:-1] + gap[1:] - np.linalg.norm(np.diff(place, axis=0), axis=1)
+    at = int(np.concatenate([gap[:1], longer, gap[-1:]]).argmin())
+    rows = np.insert(folds.rows, at, folds.rows[int(gap.argmin())], axis=0)
     z, p = np.insert(folds.z, at, fold.z, axis=0), np.insert(folds.p, at, fold.p, axis=0)
-    rows = np.insert(folds.rows, at, folds.rows[nearest], axis=0)
-    landed = known.landing
-    every = States(
-        structure,
-        np.insert(landings.z, at, landed.z, axis=0),
-        np.insert(landings.p, at, landed.p, axis=0),
-    )
-    return SetPoints(z, p, rows), every
+    landed_z = np.insert(landings.z, at, landed.z, axis=0)
+    landed_p = np.insert(landings.p, at, landed.p, axis=0)
+    return SetPoints(z, p, rows), States(structure, landed_z, landed_p)
 
 
 def _between(eset: EquilibriumSet, places: _Places, demands: Demands) -> tuple[SetPoints, States]:
