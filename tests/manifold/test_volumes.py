@@ -32,7 +32,7 @@ from equimorph.model import Box, Descriptor
 from equimorph.structures import Rod, Spring
 from oracles.complexes import assert_faithful, assert_folds_are_singular
 from oracles.polynomial import Polynomial
-from oracles.surfaces import integral
+from oracles.surfaces import integral, swallowtail
 from typecheck import unchecked
 
 BOX = Box(a=(-1.3, 1.2), b=(-1.5, 1.4), c=(-1.4, 1.3))
@@ -143,6 +143,27 @@ def test_curve_of_cusps_is_no_edge_of_the_fold_surface():
     np.testing.assert_allclose(b, 2 * x[folded] ** 3, rtol=0, atol=1e-9)
 
 
+@pytest.mark.parametrize(
+    "box",
+    [
+        Box(a=(-0.8, 0.9), b=(-0.4, 0.5), c=(-0.3, 0.3)),
+        pytest.param(Box(a=(-1.1, 0.6), b=(-0.7, 0.8), c=(-0.9, 1)), marks=pytest.mark.slow),
+        pytest.param(Box(a=(-1, 1), b=(-1, 1), c=(-1, 1)), marks=pytest.mark.slow),
+    ],
+)
+def test_a_swallowtail_is_a_ball_with_one_fold(box):
+    """x⁴ + a x² + b x + c, the graph of c: one smooth surface of folds, a disc, with two cusps.
+
+    Behind the swallowtail point its tail is narrower than any cell: of four folds on the edges of a
+    triangle two are joined around a cusp inside.
+    """
+    with unchecked():
+        eset = equilibrium_set(swallowtail(), box, intervals=(6, 7, 6))
+    assert eset.audit.clean, eset.audit
+    assert topology(eset) == (1, 1, 1)
+    assert [euler_characteristic(fold) for fold in eset.folds] == [1]
+
+
 def test_spring_over_actuator_load_and_stiffness():
     """Three equilibria where |F|/k < (1 − x_l^(2/3))^(3/2): the volume of the unstable sheet.
 
@@ -223,14 +244,11 @@ def test_every_surface_around_a_grid_cell_of_the_arch_is_a_sphere(monkeypatch):
 def test_what_a_bisection_leaves_is_found_only_once(monkeypatch):
     """Doubtful tetrahedra are divided several times; to find everything anew gives the same set."""
     monkeypatch.setitem(build.BISECTIONS, 3, 3)
-    swallowtail = Polynomial(
-        lambda x, a, b, c: integral(x**4 + a * x**2 + b * x + c), 1, ("a", "b", "c")
-    )
     box, grid = Box(a=(-1.1, 0.6), b=(-0.7, 0.8), c=(-0.9, 1.0)), (3, 3, 3)
-    at_once = lifted(swallowtail, box, grid)
+    at_once = lifted(swallowtail(), box, grid)
     assert at_once.audit.bisected > 0
     monkeypatch.setattr(cells, "volumes_over", lambda pairing, _: volumes_over(pairing, None))
-    anew = lifted(swallowtail, box, grid)
+    anew = lifted(swallowtail(), box, grid)
     assert at_once.audit == anew.audit
     one, other = (projected_volume(eset, 0) for eset in (at_once, anew))
     assert one == pytest.approx(other, rel=1e-12)

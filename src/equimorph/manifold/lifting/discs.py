@@ -4,21 +4,20 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from equimorph.arrays import Bool, Float, Int, Items, Pairs, Places, Triples
+from equimorph.arrays import Bool, Int, Items, Pairs, Triples
 from equimorph.manifold.geometry.exact_points import pin
 from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.setting import embed
-from equimorph.manifold.geometry.tangents import fold_forms
 from equimorph.manifold.geometry.topology import flags_of, keys_of, rows_of
 from equimorph.manifold.lifting.crossing_branches import lonely
 from equimorph.manifold.lifting.crossing_discs import (
     Group,
-    Ways,
     join_crossings,
     pin_ends,
     put_hubs,
     split_crossings,
 )
+from equimorph.manifold.lifting.fold_ways import continuous_ways
 from equimorph.manifold.lifting.loops import Loops, Polygon
 from equimorph.manifold.lifting.pairing import Pairing
 from equimorph.manifold.lifting.patterns import cut_by_pattern
@@ -36,9 +35,6 @@ from equimorph.manifold.lifting.polygon_cuts import (
     planes,
     triangulate,
 )
-
-SAME_SIDE = 0.3
-"""Least cosine between the sides of two folds that can belong to one fold curve in a triangle."""
 
 
 @dataclass(frozen=True)
@@ -201,7 +197,7 @@ def _join_folds(pairing: Pairing, plans: list[Plan], found: _Found) -> list[Plan
         match_folds(plan.points, plan.singular, lambda point: int(index[point])) for plan in plans
     ]
     several = [k for k, each in enumerate(ways) if len(each) > 1]
-    continuous = _continuous(pairing, [plans[k] for k in several], [ways[k] for k in several])
+    continuous = continuous_ways(pairing, [plans[k] for k in several], [ways[k] for k in several])
     for k, each in zip(several, continuous, strict=True):
         ways[k] = each
     ways = join_crossings(plans, ways)
@@ -222,54 +218,6 @@ def _join_folds(pairing: Pairing, plans: list[Plan], found: _Found) -> list[Plan
     lost = put_hubs(pairing, decided)
     found.undecided.update(lost)
     return [plan for plan in decided if plan.polygon.triangle not in lost]
-
-
-def _continuous(pairing: Pairing, plans: list[Plan], choices: list[Ways]) -> list[Ways]:
-    """Ways in which every chord joins folds whose sheets lie on the same side.
-
-    In the narrow wedge behind a cusp two fold curves run side by side at every scale: there only
-    the side on which the sheets exist distinguishes them.
-    """
-    at = [
-        (number, fold)
-        for number, (plan, ways) in enumerate(zip(plans, choices, strict=True))
-        for fold in sorted({fold for way in ways for chord in way for fold in chord})
-        if plan.singular(fold) == TURN
-    ]
-    if not at:
-        return choices
-    folds = np.array([fold for _, fold in at])
-    points = pairing.points
-    normals = fold_forms(pairing.setting, points.z[folds], points.p[folds]).existence
-    flat = _along_sides(pairing, [plans[number].polygon.triangle for number, _ in at], normals)
-    flat = flat / np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-300)
-    normal = dict(zip(at, flat, strict=True))
-    return [
-        [
-            way
-            for way in ways
-            if all(
-                normal[number, a] @ normal[number, b] > SAME_SIDE
-                for a, b in way
-                if plan.singular(a) == TURN
-            )
-        ]
-        for number, (plan, ways) in enumerate(zip(plans, choices, strict=True))
-    ]
-
-
-def _along_sides(
-    pairing: Pairing, triangles: list[int], normals: Places
-) -> Float[np.ndarray, "n 2"]:
-    """Components of normals to curves in coordinates in which their grid triangles are equilateral.
-
-    So angles between them do not depend on the scales of the parameters.
-    """
-    mesh = pairing.mesh
-    corners = mesh.vertices[mesh.triangles[triangles]] / pairing.setting.scales
-    sides = corners[:, 1:] - corners[:, :1]
-    first, second = np.einsum("nkd,nd->kn", sides, normals)
-    return np.stack([first, (2.0 * second - first) / np.sqrt(3.0)], axis=1)
 
 
 def _split_chords(pairing: Pairing, plans: list[Plan], found: _Found) -> None:

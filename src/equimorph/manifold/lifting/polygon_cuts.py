@@ -18,6 +18,9 @@ from equimorph.manifold.lifting.pairing import Pairing
 Piece = tuple[int, ...]
 Chord = tuple[int, int]
 
+MOST_FOLDS = 16
+"""Folds of a polygon that are joined, at most: 16 can be in 1430 ways, each two more in 3.4 times
+as many."""
 REGULAR, TURN, MEETING = 0, 1, 2
 """What the points of polygons are."""
 
@@ -47,7 +50,7 @@ def match_folds(
             arcs[-1] = index(point)
         else:
             return []
-    if len(folds) % 2 or any(arc is None for arc in arcs):
+    if len(folds) % 2 or len(folds) > MOST_FOLDS or any(arc is None for arc in arcs):
         return []
     kinds = {point: singular(point) for point in folds}
     return sorted(sorted(way) for way in _matchings(folds, [arc or 0 for arc in arcs], kinds))
