@@ -114,10 +114,10 @@ def test_a_path_over_vertices_on_a_constraint_is_shortened():
 def test_slopes_of_walls_are_those_of_their_distances():
     """Central differences of exact margins and of what bounds leave, step 1e-4."""
     eset = arch_set()
-    ends = [stable_near(eset, place) for place in ARCH[1]]
+    start, goal = (stable_near(eset, place) for place in ARCH[1])
     demands = Demands.of(eset.structure, "length", eset.constraints, 0.0)
     steps = CurveSteps(eset, demands)
-    curve = steps.curve(cheapest_path(eset, ends, demands))
+    curve = steps.curve(cheapest_path(eset, (start, goal), demands))
     assert curve is not None
     inner = curve.take(curve.inner)
     frames, at = tangents_at(steps.setting, SetPoints(inner.z, inner.p, inner.rows))

@@ -27,7 +27,7 @@ FIRST_HALVINGS, POLISHING, ALL_HALVINGS = 12, 40, 60
 SWEEPS, CHUNK, SHARE = 8, 256, 1024
 """Most solves; lanes at a time; least lanes that are worth a further thread."""
 
-Pairs = Float[np.ndarray, "lanes 2 size"]
+Pairs = Float[np.ndarray, "lanes 2 entries"]
 
 
 @runtime_checkable

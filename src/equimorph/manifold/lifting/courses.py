@@ -63,7 +63,7 @@ class Courses(Columns):
         return np.asarray(np.einsum("nsk,nk->ns", along, chord) / np.maximum(scale, 1e-300))
 
     @property
-    def _chords(self) -> tuple[Pairs, Values]:
+    def _chords(self) -> tuple[Float[np.ndarray, "n 2"], Values]:
         """Chords in a triangle with equal sides, and their lengths."""
         chord = (self.shares[:, 1] - self.shares[:, 0]) @ EQUILATERAL
         return chord, np.linalg.norm(chord, axis=1)

@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 from scipy.linalg import solveh_banded
 
-from equimorph.arrays import Flags, Float, Frames, Int, Lanes, Parameters, Rows, Some, Values
+from equimorph.arrays import Bool, Flags, Float, Frames, Int, Lanes, Parameters, Rows, Some, Values
 from equimorph.columns import Columns
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.geometry.setting import Setting, embed
@@ -49,6 +49,8 @@ BALANCE = 10.0
 Walls = Float[np.ndarray, "nodes walls"]
 Steps = Float[np.ndarray, "nodes d"]
 Routes = Int[np.ndarray, " nodes"]
+Each = Float[np.ndarray, " routes"]
+"""A number for each curve."""
 
 
 @dataclass(frozen=True)
@@ -102,7 +104,7 @@ class Curves(Columns):
         inner = self.inner
         return np.asarray(0.5 * (self.share[inner] + self.share[inner + 1]))
 
-    def sums(self, values: Values, nodes: Some, routes: int) -> Values:
+    def sums(self, values: Float[np.ndarray, " some"], nodes: Some, routes: int) -> Each:
         """Sums over the nodes of each curve."""
         return np.bincount(self.route[nodes], values, routes)
 
@@ -151,20 +153,20 @@ class CurveSteps:
         """States at the nodes."""
         return States(self.eset.structure, curves.z, curves.p)
 
-    def squared_lengths(self, curves: Curves, routes: int) -> Values:
+    def squared_lengths(self, curves: Curves, routes: int) -> Each:
         """Squares of the lengths."""
         place, ends = embed(self.setting, curves.z, curves.p), curves.legs
         legs = ((place[ends] - place[ends - 1]) ** 2).sum(axis=1) / curves.share[ends]
         return curves.sums(legs, ends, routes)
 
-    def values(self, curves: Curves, strengths: Values) -> Values:
+    def values(self, curves: Curves, strengths: Each) -> Each:
         """Squared lengths with barriers."""
         inner, routes = curves.inner, len(strengths)
         logs = curves.weights * np.log(curves.walls[inner]).sum(axis=1)
         barriers = strengths * curves.sums(logs, inner, routes)
         return np.asarray(self.squared_lengths(curves, routes) - barriers)
 
-    def with_forces(self, curves: Curves, strengths: Values) -> Curves:
+    def with_forces(self, curves: Curves, strengths: Each) -> Curves:
         """Curves with the forces of barriers."""
         inner, forces = curves.inner, np.ones_like(curves.walls)
         strength = strengths[curves.route[inner]] * curves.weights
@@ -172,8 +174,8 @@ class CurveSteps:
         return replace(curves, forces=forces)
 
     def step(
-        self, curves: Curves, strengths: Values, values: Values, halvings: int
-    ) -> tuple[Curves, Values]:
+        self, curves: Curves, strengths: Each, values: Each, halvings: int
+    ) -> tuple[Curves, Each]:
         """Curves after one step of each, and their values; as they were where no step lowers it."""
         frames, at = tangents_at(self.setting, SetPoints(curves.z, curves.p, curves.rows))
         curves = replace(curves, rows=at.rows)
@@ -201,8 +203,8 @@ class CurveSteps:
         return out, lowest
 
     def _moved(
-        self, curves: Curves, frames: Frames, step: Steps, push: Walls, strengths: Values
-    ) -> tuple[Curves, Flags]:
+        self, curves: Curves, frames: Frames, step: Steps, push: Walls, strengths: Each
+    ) -> tuple[Curves, Bool[np.ndarray, " routes"]]:
         """Curves with their inner nodes moved, and which of them stay on the set and inside."""
         inner, good = curves.inner, np.zeros(len(strengths), bool)
         own = curves.take(inner)
@@ -257,8 +259,8 @@ class CurveSteps:
         return moved, inside
 
     def _newton_step(
-        self, curves: Curves, frames: Frames, strengths: Values
-    ) -> tuple[Steps, Walls, Values]:
+        self, curves: Curves, frames: Frames, strengths: Each
+    ) -> tuple[Steps, Walls, Each]:
         """Steps of all nodes, changes of the forces, and the share that keeps away from walls."""
         inner, rows = curves.inner, curves.rows
         place, d = embed(self.setting, curves.z, curves.p), rows.shape[1]

@@ -193,7 +193,7 @@ class _Legs:
         pairs, count = np.stack([self.first[some], self.second[some]], axis=1), len(self.number)
         return shortest_path(count, pairs, self.cost[some] + each, (0, count - 1))
 
-    def along(self, path: Some, same_class: bool) -> Some:
+    def along(self, path: Some, same_class: bool) -> Int[np.ndarray, " legs"]:
         """Legs of a chain; within a class all shorter ones from the same corners, too."""
         used = np.asarray(self.number[path[:-1], path[1:]])
         if not same_class:
