@@ -78,6 +78,15 @@ def test_an_island_whose_edges_all_meet_one_arc_of_it_is_no_closed_piece():
     assert_whole(island(51, "lips", 78, TINY), LIPS)
 
 
+@pytest.mark.parametrize(
+    ("number", "seed", "sizes"),
+    [(72, 78, TINY), pytest.param(28, 90, SIZES, marks=pytest.mark.slow)],
+)
+def test_curves_over_the_smallest_edges_of_an_island_are_traced(number, seed, sizes):
+    """Edges of 1e-4, on which steps that turn by little are shorter than 1e-7: 20 were lost."""
+    assert_whole(island(number, "lips", seed, sizes), LIPS)
+
+
 def island_in_space(number, kind):
     """Random ellipsoid y = (u/a, v/b, w/c), |y| < 1; half axes 0.01 to 0.15 in cells of 0.3 to 0.5.
 
