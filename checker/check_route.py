@@ -144,7 +144,7 @@ class Jet:
 
 
 def planar(data, size, count):
-    """θᵀKθ/2 - θᵀSw + Σ ((1 + e)N - γ(N + T)²/2) + wᵀQw/2 - pV, N = a sin θ + b cos θ at points.
+    """θᵀKθ/2 - θᵀSw + Σ ((1 + e)N - γ(N + T)²/2) + wᵀQw/2 - Σ pV, N = a sin θ + b cos θ at points.
 
     w = (multipliers, p, 1); θ of a node is an entry of z, or prescribed: a row of `turned` times w.
     """
@@ -167,20 +167,39 @@ def planar(data, size, count):
         (np.concatenate([angles, w])[None], work[None]),
         (np.stack([angles[t["points"]], *fields], axis=1), point),
     ]
-    if "area" not in t:
-        return groups
     first, last = np.divmod(np.arange(nodes * nodes), nodes)
-    (xx, xy), (yx, yy) = t["closing"]
-    both, pull = t["weights"][first] * t["weights"][last], t["pressure"] @ w
+    names = ("area", "even", "weights", "across", "closing", "pressure")
+    if np.ndim(t.get("area")) == 2:  # files that know one pressure, on a rod
+        t |= {"even": np.zeros((nodes, nodes)), "across": np.zeros(nodes)}
+        t |= {name: t[name][None] for name in names}
+    for *tables, pressure in zip(*(t.get(name, ()) for name in names), strict=True):
+        pull = np.tile(pressure @ w, (len(first), 1))
+        pairs = np.stack([angles[first], angles[last], pull], axis=1)
+        groups.append((pairs, area_pairs(*tables)))
+    return groups
+
+
+def area_pairs(matrix, even, weights, across, closing):
+    """Pairs of -pV, V = Σ cos θᵢ Wᵢⱼ sin θⱼ + (Σ Eᵢⱼ cos (θᵢ - θⱼ) + dᵀQd)/2.
+
+    d = Σ (m + ik) (cos θ + i sin θ) in complex numbers.
+    """
+    nodes = len(weights)
+    first, last = np.divmod(np.arange(nodes * nodes), nodes)
+    (xx, xy), (yx, yy) = closing
+
+    def chord(c, s, at):
+        m, k = weights[at], across[at]
+        return c * m + s * (-k), s * m + c * k
 
     def area(one, other, pressure):
-        """Pairs of V = Σ cos θᵢ Wᵢⱼ sin θⱼ + dᵀQd/2, d = Σ m (cos θ, sin θ)."""
         (c, s), (x, y) = ((each.of("cos"), each.of("sin")) for each in (one, other))
-        closed = (c * x * xx + s * y * yy + c * y * xy + s * x * yx) * (0.5 * both)
-        return pressure * (c * y * t["area"].ravel() + closed) * -1.0
+        (c0, s0), (x0, y0) = chord(c, s, first), chord(x, y, last)
+        closed = c0 * x0 * xx + s0 * y0 * yy + c0 * y0 * xy + s0 * x0 * yx
+        half = (closed + (c * x + s * y) * even.ravel()) * 0.5
+        return pressure * (c * y * matrix.ravel() + half) * -1.0
 
-    pairs = [angles[first], angles[last], np.tile(pull, (len(first), 1))]
-    return [*groups, (np.stack(pairs, axis=1), area)]
+    return area
 
 
 def constant(size):

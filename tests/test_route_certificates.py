@@ -90,6 +90,17 @@ def portal():
     ).natural_state()  # fmt: skip
 
 
+def pressed_frame():
+    """Two pressures around a corner, one of them on a chain whose end slides."""
+    joints = {"A": (0.0, 0.0), "B": (0.0, 1.0), "C": (1.0, 0.0)}
+    members = [("A", "B"), em.Member(("C", "B"), curvature=0.3), ("A", "C")]
+    return em.Frame(
+        joints, members, {"A": "fixed", "C": "y"},
+        loads={"p": {"pressure": ["A", "B", "C"]}, "o": {"pressure": ["A", "C", "B", "A"]}},
+        elements=1, degree=5,
+    ).natural_state()  # fmt: skip
+
+
 CASES = {
     "rod": (arch, [{"Theta": 1.03}, {"Delta": 0.02}]),
     "green truss": (lambda: shallow("green"), [{"P": 3e-4}, {"a": 0.003}]),
@@ -98,6 +109,7 @@ CASES = {
     "pressed rod": (pressed, [{"p": 0.05}]),
     "frame": (lambda: toggle().natural_state(), [{"P": 0.1}, {"a": 0.01}]),
     "frame of several kinds": (portal, [{"P": 0.1}, {"a": 0.005}]),
+    "pressed frame": (pressed_frame, [{"p": 0.1}, {"o": 0.1}]),
     "spring": (lambda: em.Spring().natural_state(x_l=0.8), [{"F": 0.01}]),
     "formula": (formula, [{"F": 0.05}]),
     "constrained formula": (bead, [{"F": 0.02}]),

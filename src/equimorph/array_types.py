@@ -39,5 +39,6 @@ def _kind(name: str, *dtypes: str) -> Any:
 
 
 Bool, Float, Int = _kind("Bool", "bool"), _kind("Float", "float"), _kind("Int", "int")
+Complex = _kind("Complex", "complex")
 Num, Shaped = _kind("Num", "float", "int"), _kind("Shaped", "any")
 UInt8, UInt16 = _kind("UInt8", "uint8"), _kind("UInt16", "uint16")

@@ -1,5 +1,6 @@
 from typing import (
     Annotated as Bool,
+    Annotated as Complex,
     Annotated as Float,
     Annotated as Int,
     Annotated as Num,
@@ -8,4 +9,4 @@ from typing import (
     Annotated as UInt16,
 )
 
-__all__ = ["Bool", "Float", "Int", "Num", "Shaped", "UInt8", "UInt16"]
+__all__ = ["Bool", "Complex", "Float", "Int", "Num", "Shaped", "UInt8", "UInt16"]

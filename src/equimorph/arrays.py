@@ -7,6 +7,7 @@ import numpy as np
 
 from equimorph.array_types import (
     Bool as Bool,
+    Complex as Complex,
     Float as Float,
     Int as Int,
     Num as Num,

@@ -4,11 +4,14 @@ Both read what the frame was made from, and integrate with the frame's own Gauss
 """
 
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 from numpy.polynomial import legendre
 
+import equimorph as em
 from equimorph.structures import Frame, Member
+from typecheck import unchecked
 
 
 def rule(degree):
@@ -20,6 +23,22 @@ def rule(degree):
     powers = legendre.legvander(x, degree)
     slopes = np.stack([legendre.legval(x, legendre.legder(row)) for row in np.eye(degree + 1)], 1)
     return 0.5 * (x + 1.0), 0.5 * weights, 2.0 * slopes @ np.linalg.inv(powers)
+
+
+def segment(tangent, w, tables):
+    """∫ ρ × dρ along a member, ρ from its start: twice the area between it and its chord."""
+    nodes, weights, _ = tables
+    basis = np.linalg.inv(legendre.legvander(2.0 * nodes - 1.0, len(nodes) - 1))
+    integral = [
+        0.5 * legendre.legval(2.0 * nodes - 1.0, legendre.legint(row, lbnd=-1)) for row in basis.T
+    ]
+    pieces = tangent.reshape(*tangent.shape[:2], -1, len(nodes))
+    step = w.sum() / pieces.shape[2]
+    inside = step * pieces @ np.array(integral)
+    stops = np.cumsum(step * pieces @ weights, axis=2)
+    places = inside + (stops - step * pieces @ weights)[..., None]
+    cross = places[0] * pieces[1] - places[1] * pieces[0]
+    return (cross * step * weights).sum(axis=(1, 2))
 
 
 @dataclass
@@ -72,6 +91,8 @@ class Twin:
         weights = {each.name: each.weight or 0.0 for each in self.members}
         for load, given in self.data["loads"].items():
             for place, vector in given.items():
+                if place == "pressure":
+                    continue
                 factor = float(place == name) + (place == "weight") * weights.get(name, 0.0)
                 wide = factor * np.array([*vector, 0.0, 0.0][:3])
                 total = total + np.multiply.outer(p[:, self.names.index(load)], wide)
@@ -148,13 +169,37 @@ class Twin:
                 total = total + force * moved[:, axis] - 0.5 * give * force**2
         return total
 
+    def pressed(self, psi, moves, p):
+        """Energy whose change is the work p (δA − ½ [r × δr]) of pressures, A = ½ ∫ r × dr.
+
+        A is that of the triangles of the origin and the chords, and between chords and members; r
+        at the ends of the chain is taken for constant, which the change by a complex step wants.
+        """
+        length, tables = self.unit[0], rule(self.data["degree"])
+        fields, total = list(self.fields(psi, p)), 0.0
+        places = self.places / length + moves
+        for k, name in enumerate(self.names):
+            chain = self.data["loads"].get(name, {}).get("pressure", [])
+            size = p[:, k] * length / self.force
+            for first, last in pairwise(chain):
+                pair = [self.joints.index(first), self.joints.index(last)]
+                m = self.ends.index(pair if pair in self.ends else pair[::-1])
+                a, b = (places[:, at].T for at in self.ends[m])
+                twice = a[0] * b[1] - a[1] * b[0] + segment(fields[m][5], fields[m][3], tables)
+                total = total + 0.5 * size * (twice if pair in self.ends else -twice)
+            for end, sign in ((chain[0], 1.0), (chain[-1], -1.0)) if chain else ():
+                x, y = places[:, self.joints.index(end)].T
+                total = total + 0.5 * sign * size * (x.real * y - y.real * x)
+        return total
+
     def full(self, psi, moves, forces, reactions, p):
         """L in turns, moves of the joints, forces at the members' starts, and reactions.
 
-        Nothing is eliminated: each member joins its joints, each joint keeps to its support.
+        Nothing is eliminated: each member joins its joints, each joint keeps to its support. Forces
+        in members under pressure are the means of those at their ends.
         """
         length = self.unit[0]
-        total = self.supports(psi, p)
+        total = self.supports(psi, p) + self.pressed(psi, moves, p)
         for m, (energy, soft, s, w, drawn, tangent, strain) in enumerate(self.fields(psi, p)):
             start, end = self.ends[m]
             line = self.load(p, self.members[m].name)[:, :2].T * length / self.force
@@ -177,3 +222,52 @@ class Twin:
                     total = total - force * (moves[:, j, axis] - goal[:, axis])
                     total = total - 0.5 * give * force**2
         return total
+
+
+def loaded(frame, **values):
+    """The natural state, lifted to parameters, without the cost of checks."""
+    with unchecked():
+        return em.lift(frame.natural_state(), to=values).end.state
+
+
+def full_state(frame, state):
+    """The state with moves of joints, forces of members and reactions, as one vector."""
+    model, z, p = frame.model, state.z[None], state.p[None]
+    force, count = model.bending / model.length**2, len(model.network.joints)
+    moves = [
+        [frame.displacement(joint, axis)(state) / model.length for axis in "xy"]
+        for joint in model.network.joints
+    ]
+    reactions = np.zeros((count, 2))
+    for j, joint in enumerate(model.network.joints):
+        for axis in (0, 1):
+            if model.network.supports[j, axis]:
+                reactions[j, axis] = frame.reaction(joint, "xy"[axis])(state) / force
+    ends, pressed = frame.end_forces(z, p)[0], model.patterns.pressures.any(axis=0)
+    starts = np.where(pressed[:, None], ends.mean(axis=1), ends[:, 0])
+    parts = (state.z[: frame.unknowns], np.ravel(moves), starts.ravel(), reactions.ravel())
+    return np.concatenate(parts)
+
+
+def full_lagrangian(frame, twin, p):
+    """L of such a vector, with many lanes."""
+    n, members, joints = frame.unknowns, len(twin.members), len(twin.joints)
+    cuts = np.cumsum([n, 2 * joints, 2 * members])
+
+    def value(x):
+        psi, moves, forces, reactions = np.split(x, cuts, axis=1)
+        wide = np.concatenate([psi, np.zeros((len(x), frame.constraints))], axis=1)
+        shapes = ((-1, joints, 2), (-1, members, 2), (-1, joints, 2))
+        parts = (moves, forces, reactions)
+        given = [part.reshape(shape) for part, shape in zip(parts, shapes, strict=True)]
+        return twin.full(wide, *given, np.repeat(p[None], len(x), axis=0))
+
+    return value
+
+
+def gradients(value, points):
+    """Gradients at several points by complex steps, all in one call."""
+    count, size = points.shape
+    moved = np.repeat(points.astype(complex), size, axis=0)
+    moved += 1e-30j * np.tile(np.eye(size), (count, 1))
+    return (value(moved).imag / 1e-30).reshape(count, size)

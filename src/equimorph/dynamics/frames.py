@@ -9,7 +9,7 @@ from equimorph.arrays import Float
 from equimorph.dynamics.chain_entries import PlanarChained
 from equimorph.dynamics.linkage import Bends, Linkage, Supports
 from equimorph.dynamics.mechanism import Vector
-from equimorph.errors import MissingError
+from equimorph.errors import InputError, MissingError
 from equimorph.structures import Frame, State, States
 from equimorph.structures.frame.model import FrameModel
 from equimorph.structures.rod.units import FOUR_PI_SQUARED
@@ -111,6 +111,11 @@ class ChainedFrame(PlanarChained):
     def __init__(self, frame: Frame, links: int) -> None:
         self.structure, self._frame, self.links = frame, frame, links
         self.length, self.energy = frame.model.length, frame.energy_scale
+        if frame.pressure is not None:
+            raise InputError(
+                '`simulator` must cover the frame; got "mujoco" for one under pressure. '
+                'simulator="own" covers it.'
+            )
         known = frame.model.masses
         if known is None:
             raise MissingError(

@@ -165,12 +165,14 @@ class AnyNetwork(DiscreteStructure):
 
 
 def _plain(given: Any) -> Any:
-    """Tables of numbers, as plain data."""
+    """Tables of numbers and names, as plain data."""
     if isinstance(given, Mapping):
         return {name: _plain(value) for name, value in given.items()}
+    if isinstance(given, str):
+        return given
     if isinstance(given, int | float | np.number):
         return float(given)
-    return [float(value) for value in given]
+    return [_plain(value) for value in given]
 
 
 Apply = Callable[[Lanes, Parameters], tuple[Lanes, Parameters]]

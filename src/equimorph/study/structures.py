@@ -136,6 +136,13 @@ def _support(given: Any) -> Any:
     return given
 
 
+def _load_on_frame(given: Any) -> Any:
+    entries = given if isinstance(given, list) and len(given) > 1 else [None]
+    if not (all(map(is_number, entries)) or all(isinstance(each, str) for each in entries)):
+        raise requirement('be numbers like [0, -1], or joints under pressure like ["A", "B"]')
+    return given
+
+
 def _support_in_space(given: Any) -> Any:
     table = given if isinstance(given, dict) else {}
     fine = table and all(isinstance(x, str | list) or is_number(x) for x in table.values())
@@ -152,6 +159,8 @@ _TEXT = {"type": "string"}
 _ROW = {"type": "array", "items": _NUMBER, "minItems": 2, "maxItems": 2}
 _TABLE = {"type": "array", "items": _ROW, "minItems": 2}
 _NUMBER_OR_TEXT = {"anyOf": [_NUMBER, _TEXT]}
+_FORCE = {"type": "array", "items": _NUMBER, "minItems": 2, "maxItems": 3}
+_FORCE_OR_CHAIN = {"anyOf": [_FORCE, {"type": "array", "items": _TEXT, "minItems": 2}]}
 _WORDS = {"type": "object", "additionalProperties": _NUMBER_OR_TEXT}
 _ONE_TERM = {"type": "object", "properties": {"term": {"enum": list(TERMS)}}, "required": ["term"]}
 _ONE_OR_MORE_TERMS = {"anyOf": [_ONE_TERM, {"type": "array", "items": _ONE_TERM}]}
@@ -180,6 +189,7 @@ CrossSection = Annotated[Any, AfterValidator(_section), WithJsonSchema(_SECTION)
 EndOfRod = Annotated[Any, AfterValidator(_end), _end_form(ENDS, PLANAR_KEYS)]
 EndInSpace = Annotated[Any, AfterValidator(_end_in_space), _end_form(SPATIAL_ENDS, SPATIAL_KEYS)]
 Support = Annotated[Any, AfterValidator(_support)]
+LoadOnFrame = Annotated[Any, AfterValidator(_load_on_frame), WithJsonSchema(_FORCE_OR_CHAIN)]
 SupportInSpace = Annotated[Any, AfterValidator(_support_in_space)]
 
 
@@ -346,7 +356,7 @@ FORMS: Mapping[str, Forms] = {
     },
     "frame": {
         **{"joints": by_name(many(Quantity, 2, 2), 2), "members": many(MemberSection)},
-        **{"supports": by_name(Support), "loads": by_name(by_name(Vector))},
+        **{"supports": by_name(Support), "loads": by_name(by_name(LoadOnFrame))},
         **{"actuators": by_name(EffectSection), **RESOLUTION},
     },
     "spatial frame": {

@@ -8,57 +8,9 @@ import pytest
 import equimorph as em
 from equimorph.structures import Frame, Member
 from equimorph.structures.frame.statics import Graph
-from oracles.frames import Twin
+from oracles.frames import Twin, full_lagrangian, full_state, gradients, loaded
 from oracles.specimens import portal, toggle
 from typecheck import unchecked
-
-
-def loaded(frame, **values):
-    """The natural state, lifted to parameters, without the cost of checks."""
-    with unchecked():
-        return em.lift(frame.natural_state(), to=values).end.state
-
-
-def full_state(frame, state):
-    """The state with moves of joints, forces of members and reactions, as one vector."""
-    model, z, p = frame.model, state.z[None], state.p[None]
-    force, count = model.bending / model.length**2, len(model.network.joints)
-    moves = [
-        [frame.displacement(joint, axis)(state) / model.length for axis in "xy"]
-        for joint in model.network.joints
-    ]
-    reactions = np.zeros((count, 2))
-    for j, joint in enumerate(model.network.joints):
-        for axis in (0, 1):
-            if model.network.supports[j, axis]:
-                reactions[j, axis] = frame.reaction(joint, "xy"[axis])(state) / force
-    starts = frame.end_forces(z, p)[0, :, 0]
-    parts = (state.z[: frame.unknowns], np.ravel(moves), starts.ravel(), reactions.ravel())
-    return np.concatenate(parts)
-
-
-def full_lagrangian(frame, twin, p):
-    """L of such a vector, with many lanes."""
-    n, members, joints = frame.unknowns, len(twin.members), len(twin.joints)
-    cuts = np.cumsum([n, 2 * joints, 2 * members])
-
-    def value(x):
-        psi, moves, forces, reactions = np.split(x, cuts, axis=1)
-        wide = np.concatenate([psi, np.zeros((len(x), frame.constraints))], axis=1)
-        shapes = ((-1, joints, 2), (-1, members, 2), (-1, joints, 2))
-        parts = (moves, forces, reactions)
-        given = [part.reshape(shape) for part, shape in zip(parts, shapes, strict=True)]
-        return twin.full(wide, *given, np.repeat(p[None], len(x), axis=0))
-
-    return value
-
-
-def gradients(value, points):
-    """Gradients at several points by complex steps, all in one call."""
-    count, size = points.shape
-    moved = np.repeat(points.astype(complex), size, axis=0)
-    moved += 1e-30j * np.tile(np.eye(size), (count, 1))
-    return (value(moved).imag / 1e-30).reshape(count, size)
 
 
 @pytest.mark.parametrize(

@@ -44,8 +44,8 @@ def made(joints=JOINTS, members=MEMBERS, supports=HELD, loads=LOADS, actuators=N
         ({"joints": {**JOINTS, "B": (0, 0, 1)}}, "`joints.B` must be 2 finite numbers; got [0, 0"),
         ({"joints": {**JOINTS, "B": (0, NAN)}}, "`joints` must be places of finite numbers"),
         ({"joints": {**JOINTS, "B": (0, 0)}}, "`joints` of member A-B must lie apart"),
-        ({"joints": {**JOINTS, "B-1": (2, 0)}}, "underscores, other than weight; got 'B-1'"),
-        ({"joints": {**JOINTS, "weight": (2, 0)}}, "other than weight; got 'weight'"),
+        ({"joints": {**JOINTS, "B-1": (2, 0)}}, "other than weight, pressure; got 'B-1'"),
+        ({"joints": {**JOINTS, "weight": (2, 0)}}, "other than weight, pressure; got 'weight'"),
         # members
         ({"members": []}, "`members` must be one at least; got none"),
         ({"members": [*MEMBERS, ("A", "D")]}, "`ends` of member A-D must be joints (A, B, C)"),
@@ -79,8 +79,42 @@ def made(joints=JOINTS, members=MEMBERS, supports=HELD, loads=LOADS, actuators=N
         ({"loads": {"P": {"D": (0, 1)}}}, "`joint` must be one of A, B, C; got 'D'"),
         ({"loads": {"P": {"A-C": (0, 1)}}}, "`member` must be one of A-B, B-C; got 'A-C'"),
         ({"loads": {"P": {"A": (0, 1)}}}, "`loads.P` must act on a member, or on a joint"),
-        ({"loads": {"p": {"A-B": em.Pressure()}}}, "(no `Pressure`, which acts on a `Rod` only)"),
+        ({"loads": {"p": {"A-B": em.Pressure()}}}, "or the joints of a chain under 'pressure'"),
         ({"loads": {"P": {}}}, "`loads.P` must act on a member, or on a joint"),
+        ({"loads": {"p": {"B": ("A", "C")}}}, "`loads.p.B` must be finite numbers; got ('A', 'C')"),
+        ({"loads": {"p": {"pressure": ["A"]}}}, "`loads.p.pressure` must be joints of a chain in"),
+        (
+            {"loads": {"p": {"pressure": ["A", "B", "A", "B"]}}},
+            "must be joints of a chain in their order, each once unless it closes; got ['A', 'B'",
+        ),
+        ({"loads": {"p": {"pressure": ["A", "C"]}}}, "`member` must be one of A-B, B-C; got 'A-C'"),
+        (
+            {"loads": {"p": {"pressure": ["A", "B"]}}},
+            "`loads.p.pressure` must close, or end where supports leave one direction at most; got "
+            "B, which moves in x and y: pressure is a follower load there, without a potential.",
+        ),
+        (
+            {
+                "members": [MEMBERS[0], Member(("B", "C"), EA=50.0)],
+                "loads": {"p": {"pressure": ["A", "B", "C"]}},
+            },
+            "`loads.p.pressure` must act on inextensible members; got B-C, which has EA: pressure",
+        ),
+        (
+            {
+                "members": [*MEMBERS, Member(("A", "C"), EA=50.0)],
+                "supports": {"A": "y", "C": "y", "B": "x"},
+                "loads": {"p": {"pressure": ["A", "B", "C"]}},
+            },
+            "`loads.p.pressure` must not end at two joints that both move along x; got A and C.",
+        ),
+        (
+            {
+                "loads": {"p": {"pressure": ["A", "B", "C"]}},
+                "actuators": {"a": {"length": {"B-C": 1.0}}},
+            },
+            "`actuators` must not change the length of members under pressure; got B-C",
+        ),
         ({"loads": {"P": {"B": (0,)}}}, "`loads.P.B` must be 2 or 3 finite numbers; got (0,)"),
         ({"loads": {"P": {"weight": (0, -1)}}}, "`loads.P.weight` must act on members with a wei"),
         ({"loads": {"P 1": {"B": (0, 1)}}}, "must have different names of letters"),

@@ -31,6 +31,7 @@ def frame(joints=JOINTS, members=BOTH, supports=FIXED, loads=LOAD, **more):
         ({"supports": {"A": {"x": "held", "plane": (0, 0, 1)}}}, "`supports.A` must be fixed"),
         ({"loads": {"P": {"A": (0, 0, 1)}}}, "must act on a member, or on a joint that is free"),
         ({"loads": {"P": {"B": (0, 0)}}}, "must be 3 finite numbers"),
+        ({"loads": {"p": {"pressure": ["A", "B"]}}}, "pressure has no potential on a curve there"),
         ({"loads": {"P": {"weight": (0, 0, 1)}}}, "must act on members with a weight"),
         ({"actuators": {"a": {"move": {"B": (1, 0, 0)}}}}, "directions that the support of B"),
         ({"actuators": {"a": {"turn": {"B": (1, 0, 0)}}}}, "`B.rotation` must be held"),

@@ -270,7 +270,7 @@ class AnyFrame(StressedFrame, Shortening, Refinable):
         places = model.network.places + model.length * self.displacements(z, p)
         loaded = np.flatnonzero(given.forces.any(axis=(0, 2)))
         turned = np.flatnonzero(given.couples.any(axis=0))
-        forces, couples = self._line_loads(z, p), []
+        forces, couples = [*self._line_loads(z, p), *self.drawn_pressures(z, p)], []
         if len(loaded):
             vectors = model.force * np.einsum("lk,kja->lja", p, given.forces[:, loaded])
             forces.append(Forces(places[:, loaded], vectors))
@@ -291,6 +291,11 @@ class AnyFrame(StressedFrame, Shortening, Refinable):
         vectors = np.repeat(density[:, :, None], len(stations), axis=2)
         pairs = zip(np.moveaxis(along, 1, 0), np.moveaxis(vectors, 1, 0), strict=True)
         return [Forces(*each, distributed=True) for each in pairs]
+
+    def drawn_pressures(self, z: Lanes, p: Parameters) -> list[Forces]:
+        """Pressures, which frames in space do not have."""
+        del z, p
+        return []
 
     def _drawn_actuators(self, z: Lanes, p: Parameters) -> tuple[Actuator, ...]:
         given = self.model.patterns

@@ -5,15 +5,18 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from equimorph.arrays import Float, Lanes, Parameters
+from equimorph.arrays import Flags, Float, Lanes, Nodal, Parameters, Scalars
 from equimorph.linalg.dense import multiply
-from equimorph.model import Support
+from equimorph.model import Forces, Support
 from equimorph.model.drawing import supports_of_point, unit_vectors
 from equimorph.structures.frame.any_frame import AnyFrame
-from equimorph.structures.frame.mechanics import FrameMechanics
+from equimorph.structures.frame.mechanics import FrameMechanics, Points
 from equimorph.structures.frame.model import FrameModel
-from equimorph.structures.frame.strength import Nodal, NodalStrains
+from equimorph.structures.frame.strength import Nodal as NodalForces, NodalStrains
 from equimorph.structures.rod.extrema import largest_norms
+
+LARGEST_GAP = 1e-4
+"""Radians between ψ as integrated and as solved for, under pressure."""
 
 
 class FrameFields(FrameMechanics, AnyFrame):
@@ -55,7 +58,10 @@ class FrameFields(FrameMechanics, AnyFrame):
     def reactions(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes joints 2"]:
         """Forces of the supports on the joints."""
         y = self.scalars(z, p)
-        return np.stack([multiply(y, each.T) for each in self._reactions], axis=2)
+        found = np.stack([multiply(y, each.T) for each in self._reactions], axis=2)
+        if self.pressure is not None:
+            found += self.pressure.reactions(y, self.turns(z, y))
+        return found
 
     def shortenings(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes points"]:
         """Elastic shortenings of the axis at the points of every piece."""
@@ -76,7 +82,11 @@ class FrameFields(FrameMechanics, AnyFrame):
         for forces in self.model.forces:
             start, drop = multiply(y, forces.start), multiply(y, forces.drop)
             parts.append(np.stack([start, start - drop * self.model.lengths], axis=2))
-        return np.stack(parts, axis=3)
+        found = np.stack(parts, axis=3)
+        if self.pressure is not None:
+            pressed = self.pressure.forces(y, self.turns(z, y))
+            found += pressed.reshape(*found.shape[:2], -1, 2)[:, :, [0, -1]]
+        return found
 
     def turns_of_ends(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes members 2"]:
         """Turns of the members' ends."""
@@ -110,6 +120,9 @@ class FrameFields(FrameMechanics, AnyFrame):
         stretch = 1.0 + strain + model.softness * pulls.tension
         shear = (stretch * pulls.shear).reshape(len(z), *model.nodes.shape)
         local = np.einsum("eij,lej->lei", model.stiffness, turns[:, model.nodes]) - shear
+        if self.pressure is not None:
+            local += self.pressure.point_moments(y, turns).reshape(local.shape)
+            shear += (model.weights * self._pressed(y, turns)[1]).reshape(local.shape)
         actuated = multiply(y, model.natural.T) * model.rigidity
         extra = np.repeat(actuated, model.mesh.elements, axis=1)
         first, last = -local[:, :, 0] - extra, local[:, :, -1] - extra
@@ -120,14 +133,24 @@ class FrameFields(FrameMechanics, AnyFrame):
         inside = first[:, :, None] + change + gap[:, :, None] * model.mesh.reference.nodes
         return np.asarray(inside.reshape(len(z), *self._elements))
 
-    def elastic(self, z: Lanes, p: Parameters) -> tuple[NodalStrains, Nodal]:
+    def elastic(self, z: Lanes, p: Parameters) -> tuple[NodalStrains, NodalForces]:
         """Elastic curvatures about b at the nodes, nothing about other axes, and axial forces."""
         model, (y, turns, strain) = self.model, self._fields(z, p)
-        pulls = self._pulls(y, turns[:, model.nodes.ravel()], strain)
+        forces = self._pulls(y, turns[:, model.nodes.ravel()], strain).tension / model.weights
+        if self.pressure is not None:
+            forces += self._pressed(y, turns)[0]
         bends = np.zeros((len(z), *model.nodes.shape, 3))
         elastic = self._moments(z, p) / model.rigidity[:, None, None]
         bends[..., 2] = elastic.reshape(bends.shape[:3])
-        return bends, np.asarray((pulls.tension / model.weights).reshape(bends.shape[:3]))
+        return bends, np.asarray(forces.reshape(bends.shape[:3]))
+
+    def _pressed(self, y: Scalars, turns: Nodal) -> tuple[Points, Points]:
+        """What pressures add to the forces along and across the members at their points."""
+        assert self.pressure is not None
+        x, up = np.moveaxis(self.pressure.forces(y, turns), 2, 0)
+        angles = self.model.directions + turns[:, self.model.nodes.ravel()]
+        cosine, sine = np.cos(angles), np.sin(angles)
+        return x * cosine + up * sine, up * cosine - x * sine
 
     @property
     def _elements(self) -> tuple[int, int, int]:
@@ -152,6 +175,24 @@ class FrameFields(FrameMechanics, AnyFrame):
         return np.asarray(field.reshape(len(z), *self._elements, 2))
 
     # --- soundness and supports -----------------------------------------------------------------
+
+    def resolved(self, z: Lanes, p: Parameters) -> Flags:
+        """Whether ψ is smooth in every element, and under pressure meets what its moments say.
+
+        High pressure amplifies errors inside long elements before ψ shows any; see
+        `GeneralMechanics.resolved`.
+        """
+        good = super().resolved(z, p)
+        if self.pressure is None:
+            return good
+        model, y = self.model, self.scalars(z, p)
+        elastic = self._moments(z, p) / model.rigidity[:, None, None]
+        bends = elastic + multiply(y, model.natural.T)[:, :, None, None]
+        psi = self.turns(z, y)[:, model.nodes].reshape(bends.shape)
+        lengths = np.outer(model.lengths, model.mesh.lengths)[:, :, None]
+        turned = np.einsum("ij,lmej->lmei", model.mesh.reference.integral, bends) * lengths
+        gaps = np.abs(turned - (psi - psi[..., :1])).max(axis=(1, 2, 3))
+        return np.asarray(good & (gaps < LARGEST_GAP))
 
     def moved_by(self, turns: Float[np.ndarray, " rows"]) -> Float[np.ndarray, " unknowns"]:
         """The turns themselves."""
@@ -186,6 +227,26 @@ class FrameFields(FrameMechanics, AnyFrame):
                 held = np.eye(2), stiffness[:2]
                 found += supports_of_point(held, float(stiffness[2]), places[:, joint], inward)
         return tuple(found)
+
+    def drawn_pressures(self, z: Lanes, p: Parameters) -> list[Forces]:
+        """Force per length of each pressure, normal to its members wherever they turn."""
+        model, stations, found = self.model, np.linspace(0.0, 1.0, self.stations), []
+        if self.pressure is None:
+            return []
+        matrix = model.mesh.interpolation(stations)
+        y, along = self.scalars(z, p), model.length * self.outline(z, p, stations)
+        nodes = self.turns(z, y)[:, model.piece_nodes]
+        drawn = model.directions.reshape(len(model.lengths), -1)[:, [0, -1]]
+        angles = nodes @ matrix.T + drawn[:, :1] + np.diff(drawn, axis=1) * stations
+        normals = np.stack([-np.sin(angles), np.cos(angles)], axis=3)
+        for chain in self.pressure.chains:
+            size = chain.pull(y)[:, :, None, None] * chain.signs[:, None, None]
+            vectors = size * normals[:, chain.pieces] * (model.force / model.length)
+            pairs = zip(
+                np.moveaxis(along[:, chain.pieces], 1, 0), np.moveaxis(vectors, 1, 0), strict=True
+            )
+            found += [Forces(*each, distributed=True) for each in pairs]
+        return found
 
     def _inward_angle(self, joint: int) -> float:
         """Mean direction from a joint into its members, as drawn."""

@@ -12,11 +12,11 @@ from equimorph.arrays import Lanes, Parameters, Values
 from equimorph.errors import InputError
 from equimorph.model import Descriptor, remember_call
 from equimorph.structures.contract import Readers, Symmetry, Written
-from equimorph.structures.frame.any_model import Actuators, Loads
 from equimorph.structures.frame.fields import FrameFields
 from equimorph.structures.frame.images import PlanarImage, find_images
 from equimorph.structures.frame.model import FrameModel
 from equimorph.structures.frame.network import AXES, MemberSpec, SupportSpec, frame_network
+from equimorph.structures.frame.patterns import Actuators, Loads
 from equimorph.structures.network import Joints
 from equimorph.structures.resolution import SMALLEST_WAVE
 from equimorph.structures.stress import Stressed
@@ -156,6 +156,12 @@ class Frame(DescribedFrame):
     rigid or hinged joints. Dead loads act on joints or along members. x points right, y up; angles
     and couples count counterclockwise.
 
+    Pressure is a force per length, normal to the members of a chain wherever they turn, to the left
+    of the way along the chain if positive. It has the potential −p V with the area V to the right
+    of the chain, up to its chord: where the chain closes, so that a ring run through
+    counterclockwise is pressed inward, or where each of its ends is held or moves along x or along
+    y, as on rods; see `Pressure`. Energies and efforts count the chord as a wall, reactions do not.
+
     Unknowns are the turns of Gauss–Lobatto nodes along the members; the multipliers are forces that
     balance without loads, one for each independent cycle of members and supports in x and in y.
 
@@ -171,7 +177,8 @@ class Frame(DescribedFrame):
     loads
         By the name of the load parameter, which multiplies them: forces (x, y) or (x, y, couple)
         by joint; line loads (x, y) per length by member, like ``{"q": {"A-B": (0, -1)}}``;
-        "weight": a direction, for line loads of the members' weights.
+        "weight": a direction, for line loads of the members' weights; "pressure": the joints of a
+        chain of members, like ``{"p": {"pressure": ["A", "B", "C", "A"]}}``.
     actuators
         By the name of the actuator, per unit of the parameter: ``{"a": {"curvature": {"A-B": 1}}}``
         changes intrinsic curvatures, "length" the members' lengths, "move" places of supports
@@ -187,7 +194,8 @@ class Frame(DescribedFrame):
     InputError
         For a joint without member, joints apart, stiffness that is not positive, EI and EA in
         different units, a mechanism (with the joint that moves), supports that hold inextensible
-        members twice, a hinge or load without meaning, or a parameter without effect.
+        members twice, a hinge or load without meaning, a parameter without effect, or pressure
+        without a potential or on members that stretch or lengthen.
 
     Examples
     --------
@@ -199,6 +207,18 @@ class Frame(DescribedFrame):
     >>> bent = lift(frame.natural_state(), to={"P": 2.0}).end.state
     >>> round(-frame.displacement("C", "y")(bent), 5)
     0.49346
+
+    A ring of radius 1 buckles under a pressure of 3 EI/R³ [TimoshenkoGere1961]_, in two ways:
+
+    >>> from equimorph import Member
+    >>> joints = {"A": (0, -1), "B": (1, 0), "C": (0, 1), "D": (-1, 0)}
+    >>> pairs = [("A", "B"), ("B", "C"), ("C", "D"), ("D", "A")]
+    >>> arcs = [Member(pair, curvature=1.0) for pair in pairs]
+    >>> loads = {"p": {"pressure": ["A", "B", "C", "D", "A"]}}
+    >>> ring = Frame(joints, arcs, {"A": "pinned", "C": "x"}, loads)
+    >>> end = lift(ring.natural_state(), to={"p": 5.0}).end
+    >>> end.kind, round(end.state["p"], 5)
+    ('multiple point', 3.0)
     """
 
     @check_arguments

@@ -169,7 +169,7 @@ class PlanarImage(FrameImage):
         return bool(np.array_equal(supports[self.joints], supports))
 
     def turning_effects(self, k: int) -> Effects:
-        """Couples, turns of supports, and curvatures."""
+        """Couples, turns of supports, curvatures, and pressures."""
         given = self.model.patterns
         bend = self.turn * np.where(self.reversed, -1.0, 1.0)
         strain = given.strains[k, :, 0]
@@ -177,6 +177,7 @@ class PlanarImage(FrameImage):
         return [
             *(self.put(self.joints, self.turn * each, each) for each in angles),
             self.put(self.there, bend * strain, strain),
+            self.put(self.there, bend * given.pressures[k], given.pressures[k]),
         ]
 
     def move(

@@ -25,6 +25,7 @@ from equimorph.structures.discrete import DiscreteStructure, linearise
 from equimorph.structures.equations import Direction, Enclosed
 from equimorph.structures.frame.kernels import linearise_lanes
 from equimorph.structures.frame.model import FrameModel
+from equimorph.structures.frame.pressure import FramePressure
 from equimorph.structures.rod.planar_energy import PlanarEnergy
 
 
@@ -44,6 +45,9 @@ class Tables:
         model, n = self.model, self.model.unknowns
         found = {(i, i) for i in range(n + model.multipliers)}
         for row in model.place[model.nodes].tolist():
+            found |= {(i, j) for i in row for j in row if i >= j >= 0}
+        for chain in model.chains:
+            row = model.place[chain.nodes].tolist()
             found |= {(i, j) for i in row for j in row if i >= j >= 0}
         forces = self.which
         for m, row in enumerate(model.place[model.piece_nodes].tolist()):
@@ -180,6 +184,12 @@ class FrameMechanics(DiscreteStructure):
         self.unknowns, self.constraints = model.unknowns, model.multipliers
         self.mass = model.mass
 
+    @cached_property
+    def pressure(self) -> FramePressure | None:
+        """What pressures do; None without any."""
+        chains = self.model.chains
+        return FramePressure(self.model, self.layout, chains) if chains else None
+
     @property
     def layout(self) -> SparseLayout:
         """Sparsity of F_z."""
@@ -220,7 +230,15 @@ class FrameMechanics(DiscreteStructure):
 
     def linearised(self, z: Lanes, p: Parameters, dp: Parameters) -> tuple[Lanes, Lanes, Entries]:
         """F, F_p·dp and the entries of F_z."""
-        return linearise(linearise_lanes, self.tables.shared, self.layout, (z, p, dp))
+        out = linearise(linearise_lanes, self.tables.shared, self.layout, (z, p, dp))
+        if self.pressure is not None:
+            y, dy = self.scalars(z, p), self.scalars(np.zeros_like(z), dp, 0.0)
+            turns, moved = self.turns(z, y), self.turns(np.zeros_like(z), dy)
+            free, (residual, column, entries) = self.model.place >= 0, out
+            residual[:, : self.unknowns] += self.pressure.moments(y, turns)[:, free]
+            column[:, : self.unknowns] += self.pressure.change(y, turns, dy, moved)[:, free]
+            self.pressure.add_entries(entries, y, turns)
+        return out
 
     @cached_property
     def planar_energy(self) -> PlanarEnergy:
@@ -233,7 +251,8 @@ class FrameMechanics(DiscreteStructure):
             stiffness=model.stiffness, springs=model.springs, slope=model.slope.T,
             points=model.nodes.ravel(), sine=sines, cosine=cosines, stretch=stretch,
             tension=np.zeros_like(sines), softness=model.softness, quadratic=model.quadratic,
-            pressure=np.zeros(model.scalars),
+            pressure=np.array([each.row for each in model.chains]).reshape(-1, model.scalars),
+            areas=tuple(each.whole_area for each in model.chains),
         )  # fmt: skip
 
     def enclosure(self, z: Interval, p: Interval) -> Enclosed:
@@ -253,6 +272,8 @@ class FrameMechanics(DiscreteStructure):
         stored = (1.0 + strain + 0.5 * model.softness * pulls.tension) * pulls.tension
         total -= stored.sum(axis=1)
         total += 0.5 * (multiply(y, model.quadratic) * y).sum(axis=1)
+        if self.pressure is not None:
+            total += self.pressure.energy(y, turns)
         gaps = self.residual(z, p)[:, self.unknowns :]
         return np.asarray(total - (z[:, self.unknowns :] * gaps).sum(axis=1))
 
@@ -262,6 +283,8 @@ class FrameMechanics(DiscreteStructure):
         pulls = self._pulls(y, turns[:, model.nodes.ravel()], strain)
         stretch = 1.0 + strain + model.softness * pulls.tension
         total = multiply(turns, self.planar_energy.assembled) - multiply(y, model.slope.T)
+        if self.pressure is not None:
+            total += self.pressure.moments(y, turns)
         return np.asarray(total - multiply(stretch * pulls.shear, self._gather))
 
     @cached_property
@@ -281,6 +304,8 @@ class FrameMechanics(DiscreteStructure):
         total -= multiply(stretch * np.cos(psi), model.cosine[:, own])
         total -= multiply(pulls.tension, model.stretch[model.owner][:, own])
         held = model.place < 0
+        if self.pressure is not None:
+            total += self.pressure.effort(turns)[:, own]
         if held.any():
             total += multiply(self.nodal_moments(z, p)[:, held], model.turned[held][:, own])
         return np.asarray(total)
@@ -300,8 +325,10 @@ class FrameMechanics(DiscreteStructure):
         s_vw = -by_v.tension * dw - by_w.tension * dv - here.shear * dv * dw
         stretch, first_v, first_w = 1.0 + e + gamma * here.tension, ev + gamma * pv, ew + gamma * pw
         moments = stretch * s_vw + first_v * sw + first_w * sv + gamma * p_vw * here.shear
-        out = np.empty_like(z)
-        out[:, : self.unknowns] = -multiply(moments, self._gather)[:, model.place >= 0]
+        out, bent = np.empty_like(z), -multiply(moments, self._gather)
+        if self.pressure is not None:
+            bent += self.pressure.second(y, turns, (yv, tv), (yw, tw))
+        out[:, : self.unknowns] = bent[:, model.place >= 0]
         # a multiplier's P = along cos ψ + across sin ψ, its first and second changes
         twice = gamma * p_vw - stretch * dv * dw
         once = first_v * dw + first_w * dv

@@ -9,6 +9,7 @@ import numpy as np
 from equimorph.arrays import Bool, Float, Int
 from equimorph.structures.frame.any_model import AnyFrameModel
 from equimorph.structures.frame.network import FrameNetwork
+from equimorph.structures.frame.pressure import PressedChain
 from equimorph.structures.frame.statics import Graph
 
 Scalars = Float[np.ndarray, "scalars scalars"]
@@ -30,12 +31,13 @@ class Forces(NamedTuple):
 class FrameModel(AnyFrameModel):
     """The Lagrangian of a frame in turns ψ of its nodes and *scalars* y = (multipliers, p, 1).
 
-    ``L = ½ ψᵀKψ − ψ·(slope y) − Σ ((1 + e) P + ½ γ P²) + ½ yᵀ Q y`` with the sum over the nodes of
-    every element ("points"), ``P = A sin ψ + B cos ψ`` the tension times the quadrature weight,
-    ``A = sine y``, ``B = cosine y``, e = stretch y the actuated and γP the elastic strain. ψ is
-    measured from the frame as drawn. It is what remains of the energy of bending, of stretching,
-    of supports and loads when the joints' positions are eliminated: the forces f in the members
-    balance for any y, and with unit tangents t, T as drawn, ``L = bending − ∫ f·(t − T) ds − …``.
+    ``L = ½ ψᵀKψ − ψ·(slope y) − Σ ((1 + e) P + ½ γ P²) + ½ yᵀ Q y − Σ p V`` with the sum over the
+    nodes of every element ("points"), ``P = A sin ψ + B cos ψ`` the tension times the quadrature
+    weight, ``A = sine y``, ``B = cosine y``, e = stretch y the actuated and γP the elastic strain,
+    and V of `pressure.PressedChain`. ψ is measured from the frame as drawn. It is what remains of
+    the energy of bending, of stretching, of supports and loads when the joints' positions are
+    eliminated: the forces f in the members balance for any y, without p, and with unit tangents t
+    and T as drawn, ``L = bending − ∫ f·(t − T) ds − …``.
     The derivative by a multiplier says that a cycle of members closes.
     """
 
@@ -130,6 +132,14 @@ class FrameModel(AnyFrameModel):
         owner = self.owner
         along = np.asarray(forces.start[:, owner] - forces.drop[:, owner] * self.arclengths)
         return along.T
+
+    @cached_property
+    def chains(self) -> tuple[PressedChain, ...]:
+        """Members under pressure."""
+        given = self.patterns.pressures
+        return tuple(
+            PressedChain.of(self, int(k), given[k]) for k in np.flatnonzero(given.any(axis=1))
+        )
 
     # --- points ---------------------------------------------------------------------------------
 

@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
@@ -12,7 +13,7 @@ from equimorph.argument_kinds import one_of
 from equimorph.argument_notes import TWO_NAMES, positive_quantity
 from equimorph.arrays import Bool, Float
 from equimorph.errors import InputError
-from equimorph.structures.frame.any_model import WEIGHT, AnyFrameNetwork
+from equimorph.structures.frame.any_network import PRESSURE, WEIGHT, AnyFrameNetwork
 from equimorph.structures.frame.member import AnyMember
 from equimorph.structures.network import (
     Joints,
@@ -200,6 +201,43 @@ class FrameNetwork(AnyFrameNetwork):
         """Whether a member is rigidly joined to a joint."""
         return bool(self.rigid[joint])
 
+    def press(self, joints: Sequence[str], what: str) -> Float[np.ndarray, " pieces"]:
+        """Signs of the members along a chain; InputError where pressure has no potential."""
+        names, signs = list(joints), np.zeros(len(self.edge_names))
+        inner = names[1:] if names[:1] == names[-1:] else names
+        if len(names) < 2 or len(set(inner)) < len(inner):
+            raise InputError(
+                f"`{what}` must be joints of a chain in their order, each once unless it closes; "
+                f"got {joints!r}."
+            )
+        for pair in pairwise(names):
+            at, sign = self.place_of_edge("-".join(map(str, pair)))
+            if self.made[at].EA is not None:
+                raise InputError(
+                    f"`{what}` must act on inextensible members; got {self.edge_names[at]}, which "
+                    "has EA: pressure on a stretching axis is not modelled."
+                )
+            signs[at] = sign
+        if names[0] != names[-1]:
+            self._check_ends_of_chain((names[0], names[-1]), what)
+        return signs
+
+    def _check_ends_of_chain(self, ends: tuple[str, str], what: str) -> None:
+        moves = [np.flatnonzero(np.isfinite(self.supports[self.joint(end), :2])) for end in ends]
+        for end, some in zip(ends, moves, strict=True):
+            if len(some) > 1:
+                raise InputError(
+                    f"`{what}` must close, or end where supports leave one direction at most; got "
+                    f"{end}, which moves in x and y: pressure is a follower load there, without a "
+                    "potential. Close the chain, or hold x or y."
+                )
+        both = set(moves[0].tolist()) & set(moves[1].tolist())
+        if both:
+            raise InputError(
+                f"`{what}` must not end at two joints that both move along {AXES[min(both)]}; got "
+                f"{' and '.join(ends)}. Close the chain, or hold one of them."
+            )
+
     def bears(
         self, forces: Float[np.ndarray, "joints 2"], couples: Float[np.ndarray, " joints"]
     ) -> bool:
@@ -235,7 +273,7 @@ def frame_network(
         For joints without place or members, members between unknown or equal joints, arcs that do
         not reach, unknown supports, or joints that are not connected to the rest.
     """
-    names, places = places_of_joints(joints, system, (2,), reserved=(WEIGHT,))
+    names, places = places_of_joints(joints, system, (2,), reserved=(WEIGHT, PRESSURE))
     made = tuple(Member.read(each).measured(system) for each in members)
     ends, _ = edges_between(made, names)
     held = np.zeros((len(names), 3))

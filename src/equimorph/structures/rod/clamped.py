@@ -147,7 +147,7 @@ class ClampedMechanics(PlanarMechanics):
             elements=self.mesh.element_nodes, stiffness=self.layout.stiffness,
             springs=np.zeros(nodes), slope=nothing, points=np.arange(nodes), sine=sines,
             cosine=cosines, stretch=nothing, tension=nothing, softness=np.zeros(nodes),
-            quadratic=span, pressure=np.zeros(scalars),
+            quadratic=span, pressure=np.zeros((0, scalars)),
         )  # fmt: skip
 
     def effort(self, z: Lanes, p: Parameters) -> Parameters:

@@ -61,7 +61,9 @@ class GeneralMechanics(JointEquations, PlanarMechanics):
         self.layout = CondensedLayout(np.ascontiguousarray(model.stiffness), ends)
         self.mass = model.mesh.weights[self.unknown_nodes].copy()
         self.unknowns = len(self.mass)
-        self._area = EnclosedArea(model.mesh, model.closing) if model.pressure.any() else None
+        self._area = (
+            EnclosedArea.of_rod(model.mesh, model.closing) if model.pressure.any() else None
+        )
 
     @property
     def unknown_nodes(self) -> slice:
@@ -306,6 +308,7 @@ class GeneralMechanics(JointEquations, PlanarMechanics):
     def planar_energy(self) -> PlanarEnergy:
         """Tables of the model."""
         model, nodes = self.model, len(self.mesh.nodes)
+        areas = () if self._area is None else (self._area,)
         place, turned = np.full(nodes, -1), np.zeros((nodes, model.scalars))
         place[self.unknown_nodes] = range(self.unknowns)
         turned[[0, -1]] = model.turned
@@ -314,7 +317,7 @@ class GeneralMechanics(JointEquations, PlanarMechanics):
             stiffness=self.layout.stiffness, springs=np.zeros(nodes), slope=model.slope,
             points=self.mesh.element_nodes.ravel(), sine=model.sine, cosine=model.cosine,
             stretch=np.zeros_like(model.sine), tension=model.tension, softness=model.softness,
-            quadratic=model.quadratic, pressure=model.pressure, area=self._area,
+            quadratic=model.quadratic, pressure=model.pressure[None][: len(areas)], areas=areas,
         )  # fmt: skip
 
     def solver(

@@ -12,7 +12,7 @@ from equimorph.structures.rod import general_field_kernels
 from equimorph.structures.rod.discretisation import Reference, reference_element
 from equimorph.structures.rod.general_field_kernels import KAPPA, THETA, X, Y
 from equimorph.structures.rod.model import RodModel
-from equimorph.structures.rod.pressure import EnclosedArea
+from equimorph.structures.rod.pressure import EnclosedArea, rod_quadrature
 
 Angles = Float[np.ndarray, "lanes nodes"]
 
@@ -43,8 +43,8 @@ class GeneralFields:
         coarse = model.mesh.reference
         spread = legendre.legvander(2.0 * self.reference.nodes - 1.0, coarse.degree)
         rows = (fine.across, fine.along, fine.bending, fine.tension)
-        area = EnclosedArea(model.mesh, model.closing)
-        pressed = area.rows[:, 0] if model.pressure.any() else np.zeros((0, 0))
+        area = EnclosedArea.of_rod(model.mesh, model.closing)
+        pressed = rod_quadrature(model.mesh)[:, 0] if model.pressure.any() else np.zeros((0, 0))
         return (
             model.bending_stiffness,
             model.element_slope,

@@ -18,7 +18,7 @@ Points = Float[np.ndarray, "scalars points"]
 class PlanarEnergy:
     """A Lagrangian in the angles θ of nodes and *scalars* y = (multipliers, parameters, 1).
 
-    ``L = ½ θᵀKθ − θ·(slope y) + Σ ((1 + e) N − ½ γ (N + T)²) + ½ yᵀ Q y − p V`` with the sum over
+    ``L = ½ θᵀKθ − θ·(slope y) + Σ ((1 + e) N − ½ γ (N + T)²) + ½ yᵀ Q y − Σ p V`` with the sum over
     points, ``N = a sin θ + b cos θ`` at the node of each, and a, b, e, T combinations of y.
 
     Parameters
@@ -35,8 +35,8 @@ class PlanarEnergy:
         γ.
     quadratic
         Q.
-    pressure, area
-        p by scalar, and V; None: without pressure.
+    pressure, areas
+        p by scalar, and V, of each pressure.
     """
 
     place: Int[np.ndarray, " nodes"]
@@ -52,15 +52,19 @@ class PlanarEnergy:
     tension: Points
     softness: Float[np.ndarray, " points"]
     quadratic: Float[np.ndarray, "scalars scalars"]
-    pressure: Float[np.ndarray, " scalars"]
-    area: EnclosedArea | None = None
+    pressure: Float[np.ndarray, "areas scalars"]
+    areas: tuple[EnclosedArea, ...] = ()
 
     def numbers(self) -> dict[str, Any]:
         """The tables in plain numbers; see `Equations.plain_energy`."""
         tables = {each.name: getattr(self, each.name) for each in fields(self)}
-        area = tables.pop("area")
-        if area is not None:
-            tables |= {"area": area.matrix, "weights": area.mesh.weights, "closing": area.closing}
+        areas = tables.pop("areas")
+        if areas:
+            parts = [
+                {"area": each.matrix, "even": each.even, "weights": each.weights.real,
+                 "across": each.weights.imag, "closing": each.closing} for each in areas
+            ]  # fmt: skip
+            tables |= {name: np.stack([each[name] for each in parts]) for name in parts[0]}
         return {"kind": "planar", **{name: each.tolist() for name, each in tables.items()}}
 
     @cached_property
@@ -134,39 +138,50 @@ class PlanarEnergy:
         hessian[:, at, at] = hessian[:, at, at] + curved
         cross = product(sums, mixed.transpose(0, 2, 1)) - self.slope.T
         hessian[:, :nodes, nodes:], hessian[:, nodes:, nodes:] = cross, twice
-        if self.area is not None:
-            self._press(self.area, theta, y, gradient, hessian)
+        for area, pressure in zip(self.areas, self.pressure, strict=True):
+            _press(area, pressure, (theta, y), (gradient, hessian))
         hessian[:, nodes:, :nodes] = hessian[:, :nodes, nodes:].transpose(0, 2, 1)
         return gradient, hessian
 
-    def _press(
-        self,
-        area: EnclosedArea,
-        theta: Interval,
-        y: Interval,
-        gradient: Interval,
-        hessian: Interval,
-    ) -> None:
-        """Add the part −p V: with d = Σ m (cos θ, sin θ), ``V = cos θ·(W sin θ) + ½ d·(Q d)``."""
-        nodes, m = theta.shape[1], area.mesh.weights
-        s, c = sine(theta), cosine(theta)
-        closed = product(
-            area.closing, join([(m * each).sum(1)[:, None] for each in (c, s)], 1)[..., None]
-        )
-        by_cosine, by_sine = (
-            product(matrix, each[..., None])[..., 0] + m * closed[:, row]
-            for row, (matrix, each) in enumerate(((area.matrix, s), (area.matrix.T, c)))
-        )
-        force = c * by_sine - s * by_cosine
-        slopes = -(m * s), m * c
-        bend = area.matrix * (c[:, :, None] * s[:, None] - s[:, :, None] * c[:, None])
-        for one, row in zip(slopes, area.closing, strict=True):
-            for other, factor in zip(slopes, row, strict=True):
-                bend = bend + factor * (one[:, :, None] * other[:, None])
-        at = np.arange(nodes)
-        bend[:, at, at] = bend[:, at, at] - c * by_cosine - s * by_sine
-        pull = product(self.pressure[None], y[..., None])
-        gradient[:, :nodes] = gradient[:, :nodes] - pull[:, 0] * force
-        hessian[:, :nodes, :nodes] = hessian[:, :nodes, :nodes] - pull * bend
-        cross = hessian[:, :nodes, nodes:] - force[..., None] * self.pressure
-        hessian[:, :nodes, nodes:] = cross
+
+def _press(
+    area: EnclosedArea,
+    pressure: Float[np.ndarray, " scalars"],
+    at: tuple[Interval, Interval],
+    out: tuple[Interval, Interval],
+) -> None:
+    """Add the part −p V to gradient and Hessian.
+
+    With d = Σ m u, ``V = cos θ·(W sin θ) + ½ (cos θ·(E cos θ) + sin θ·(E sin θ) + d·(Q d))``.
+    """
+    (theta, y), (gradient, hessian) = at, out
+    nodes, (force, bend) = theta.shape[1], _derivatives_of_area(area, theta)
+    pull = product(pressure[None], y[..., None])
+    gradient[:, :nodes] = gradient[:, :nodes] - pull[:, 0] * force
+    hessian[:, :nodes, :nodes] = hessian[:, :nodes, :nodes] - pull * bend
+    cross = hessian[:, :nodes, nodes:] - force[..., None] * pressure
+    hessian[:, :nodes, nodes:] = cross
+
+
+def _derivatives_of_area(area: EnclosedArea, theta: Interval) -> tuple[Interval, Interval]:
+    """∂V/∂θ and ∂²V/∂θ∂θ; parts that are zero on rods are left out there."""
+    m, k = area.weights.real, area.weights.imag
+    slanted, diagonal = bool(area.even.any() or k.any()), np.arange(theta.shape[1])
+    s, c = sine(theta), cosine(theta)
+    slopes, chord = [-(m * s), m * c], [m * c, m * s]
+    if slanted:
+        slopes = [slopes[0] - k * c, slopes[1] - k * s]
+        chord = [chord[0] - k * s, chord[1] + k * c]
+    closed = product(area.closing, join([each.sum(1)[:, None] for each in chord], 1)[..., None])
+    by_cosine = product(area.matrix, s[..., None])[..., 0] + m * closed[:, 0]
+    by_sine = product(area.matrix.T, c[..., None])[..., 0] + m * closed[:, 1]
+    bend = area.matrix * (c[:, :, None] * s[:, None] - s[:, :, None] * c[:, None])
+    if slanted:
+        by_cosine = by_cosine + product(area.even, c[..., None])[..., 0] + k * closed[:, 1]
+        by_sine = by_sine + product(area.even, s[..., None])[..., 0] - k * closed[:, 0]
+        bend = bend + area.even * (c[:, :, None] * c[:, None] + s[:, :, None] * s[:, None])
+    for one, row in zip(slopes, area.closing, strict=True):
+        for other, factor in zip(slopes, row, strict=True):
+            bend = bend + factor * (one[:, :, None] * other[:, None])
+    bend[:, diagonal, diagonal] = bend[:, diagonal, diagonal] - c * by_cosine - s * by_sine
+    return c * by_sine - s * by_cosine, bend

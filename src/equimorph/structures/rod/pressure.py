@@ -6,22 +6,89 @@ from functools import cached_property
 
 import numpy as np
 
-from equimorph.arrays import Entries, Float, Int, Nodal, Values
+from equimorph.arrays import Complex, Entries, Float, Int, Nodal, Values
 from equimorph.linalg.dense import multiply
 from equimorph.structures.rod.discretisation import Mesh
+
+Phases = Complex[np.ndarray, "lanes nodes"]
+
+
+def double_quadrature(
+    weights: Float[np.ndarray, "elements order"],
+    lengths: Float[np.ndarray, " elements"],
+    integral: Float[np.ndarray, "order order"],
+    sides: Float[np.ndarray, "elements elements"],
+) -> Float[np.ndarray, "elements order elements order"]:
+    """W of ``½ ∫∫ sign(s − s') cos θ(s) sin θ(s') ds' ds`` for the nodes of all elements.
+
+    Parameters
+    ----------
+    weights, lengths
+        Quadrature weights and lengths of the elements.
+    integral
+        Integrals from the start of an element of length 1 to its nodes.
+    sides
+        Sign of s − s' in different elements.
+    """
+    out = 0.5 * sides[:, None, :, None] * weights[:, :, None, None] * weights
+    for e, (here, length) in enumerate(zip(weights, lengths, strict=True)):
+        double = here[:, None] * length * integral
+        out[e, :, e] = 0.5 * (double - double.T)
+    return np.asarray(out)
+
+
+def rod_quadrature(mesh: Mesh) -> Float[np.ndarray, "elements order nodes"]:
+    """W of a rod before the nodes that elements share are added up in its rows."""
+    at = np.arange(mesh.elements)
+    sides = np.sign(at[:, None] - at).astype(float)
+    reference = mesh.reference.integral
+    whole = double_quadrature(mesh.element_weights, mesh.lengths, reference, sides)
+    out = np.zeros((*whole.shape[:2], len(mesh.nodes)))
+    for f, there in enumerate(mesh.element_nodes):
+        out[:, :, there] += whole[:, :, f]
+    return out
+
+
+def unit_tangents(theta: Nodal) -> Phases:
+    """exp(iθ)."""
+    return np.asarray(np.cos(theta) + 1j * np.sin(theta))
 
 
 @dataclass(frozen=True, eq=False)
 class EnclosedArea:
     """``V = ½ ∫ (y cos θ − x sin θ) ds + ½ dᵀ Q d``, whose gradient is the work of pressure.
 
-    The integral is the area left of the chord d from end A to end B. Double quadrature at the
-    nodes: ``Σ cos θᵢ Wᵢⱼ sin θⱼ`` with an antisymmetric W, so that it does not change when the rod
-    turns as a whole. Q closes the area where an end moves along a line, see `closing`.
+    The integral is the area left of the chord d from the start to the end. With tangents t as
+    complex numbers it is ``½ Σ Wᵢⱼ Im(t̄ᵢ tⱼ)`` with an antisymmetric W, so that it does not change
+    when all turns as a whole. Tangents at the nodes are u = exp(iθ) times what their node has as
+    drawn: ``V = ½ Σ (Eᵢⱼ − i Wᵢⱼ) ūᵢ uⱼ + ½ Re(q d²)`` with d = Σ m u and q = Q₀₀ − i Q₀₁.
+
+    Parameters
+    ----------
+    matrix, even
+        W, and the symmetric E, which is zero where θ is measured from one axis everywhere.
+    weights
+        m.
+    closing
+        Q, which closes the area where an end moves along a line, see `closing`.
     """
 
-    mesh: Mesh
+    matrix: Float[np.ndarray, "nodes nodes"]
+    even: Float[np.ndarray, "nodes nodes"]
+    weights: Complex[np.ndarray, " nodes"]
     closing: Float[np.ndarray, "2 2"]
+
+    @classmethod
+    def of_rod(cls, mesh: Mesh, closing: Float[np.ndarray, "2 2"]) -> "EnclosedArea":
+        """Area of a rod with angles θ at the nodes of a mesh."""
+        total = np.zeros((len(mesh.nodes), len(mesh.nodes)))
+        np.add.at(total, mesh.element_nodes, rod_quadrature(mesh))
+        return cls(total, np.zeros_like(total), mesh.weights.astype(complex), closing)
+
+    def part(self, nodes: slice | Int[np.ndarray, " some"]) -> "EnclosedArea":
+        """What couples some nodes."""
+        matrix, even = (each[nodes][:, nodes] for each in (self.matrix, self.even))
+        return EnclosedArea(matrix, even, self.weights[nodes], self.closing)
 
     @property
     def pole(self) -> Float[np.ndarray, "2 2"]:
@@ -34,94 +101,65 @@ class EnclosedArea:
         return np.array([[0.5 + yx, yy], [-xx, 0.5 - xy]])
 
     @cached_property
-    def rows(self) -> Float[np.ndarray, "elements order nodes"]:
-        """W before the nodes that elements share are added up."""
-        mesh, weights = self.mesh, self.mesh.element_weights
-        out = np.zeros((mesh.elements, mesh.degree + 1, len(mesh.nodes)))
-        for e, here in enumerate(mesh.element_nodes):
-            double = weights[e][:, None] * mesh.lengths[e] * mesh.reference.integral
-            out[e][:, here] += 0.5 * (double - double.T)
-            for f, there in enumerate(mesh.element_nodes):
-                side = 0.5 * np.sign(e - f)
-                np.add.at(out[e].T, there, side * np.outer(weights[f], weights[e]))
-        return out
+    def closed(self) -> complex:
+        """q."""
+        return complex(self.closing[0, 0], -self.closing[0, 1])
 
     @cached_property
-    def matrix(self) -> Float[np.ndarray, "nodes nodes"]:
-        """W."""
-        total = np.zeros((len(self.mesh.nodes), len(self.mesh.nodes)))
-        np.add.at(total, self.mesh.element_nodes, self.rows)
-        return total
+    def _slanted(self) -> bool:
+        return bool(self.even.any())
+
+    def _coupled(self, u: Phases) -> Phases:
+        """(E − i W) u."""
+        x, y = u.real, u.imag
+        out = multiply(y, self.matrix.T) - 1j * multiply(x, self.matrix.T)
+        if self._slanted:
+            out = out + multiply(x, self.even) + 1j * multiply(y, self.even)
+        return np.asarray(out)
+
+    def _chord(self, u: Phases) -> Complex[np.ndarray, "lanes 1"]:
+        """d, or its change where u is that of u."""
+        return np.asarray((self.weights * u).sum(axis=1)[:, None])
 
     def chord(self, theta: Nodal) -> Float[np.ndarray, "lanes 2"]:
         """d."""
-        both = np.stack([np.cos(theta), np.sin(theta)], axis=2)
-        return np.asarray(np.einsum("lnk,n->lk", both, self.mesh.weights))
-
-    def _closed(self, theta: Nodal) -> Float[np.ndarray, "2 lanes 1"]:
-        """Q d."""
-        return np.asarray((self.chord(theta) @ self.closing).T[:, :, None])
+        d = self._chord(unit_tangents(theta))
+        return np.concatenate([d.real, d.imag], axis=1)
 
     def value(self, theta: Nodal) -> Values:
         """V."""
-        chorded = (np.cos(theta) * multiply(np.sin(theta), self.matrix.T)).sum(axis=1)
-        d = self.chord(theta)
-        return np.asarray(chorded + 0.5 * np.einsum("li,ij,lj->l", d, self.closing, d))
+        u = unit_tangents(theta)
+        coupled = (u.conj() * self._coupled(u)).real.sum(axis=1)
+        return np.asarray(0.5 * (coupled + (self.closed * self._chord(u)[:, 0] ** 2).real))
 
     def gradient(self, theta: Nodal) -> Nodal:
-        """∂V/∂θ: −sin θ (W sin θ) − cos θ (W cos θ) + (Q d)·∂d/∂θ."""
-        s, c = np.sin(theta), np.cos(theta)
-        x, y = self._closed(theta)
-        chorded = -s * multiply(s, self.matrix.T) - c * multiply(c, self.matrix.T)
-        return np.asarray(chorded + self.mesh.weights * (y * c - x * s))
+        """∂V/∂θ."""
+        u = unit_tangents(theta)
+        ends = self.closed * self._chord(u) * self.weights * u
+        return np.asarray((u.conj() * self._coupled(u) - ends).imag)
 
     def curvature(self, theta: Nodal) -> Nodal:
         """∂²V/∂θᵢ²."""
-        s, c = np.sin(theta), np.cos(theta)
-        chorded = s * multiply(c, self.matrix.T) - c * multiply(s, self.matrix.T)
-        slope = self.mesh.weights * np.stack([-s, c])
-        both = np.einsum("aln,ab,bln->ln", slope, self.closing, slope)
-        return np.asarray(chorded + self._bend(theta) + both)
-
-    def _bend(self, theta: Nodal) -> Nodal:
-        """(Q d)·∂²d/∂θ²."""
-        x, y = self._closed(theta)
-        return np.asarray(-self.mesh.weights * (x * np.cos(theta) + y * np.sin(theta)))
+        u = unit_tangents(theta)
+        own = self.even.diagonal() - u.conj() * self._coupled(u)
+        arm = self.weights * u
+        return np.asarray((own - self.closed * (arm + self._chord(u)) * arm).real)
 
     def gradient_derivative(self, theta: Nodal, v: Nodal) -> Nodal:
         """Derivative of the gradient along v."""
-        s, c = np.sin(theta), np.cos(theta)
-        own = s * multiply(c, self.matrix.T) - c * multiply(s, self.matrix.T)
-        others = c * multiply(s * v, self.matrix.T) - s * multiply(c * v, self.matrix.T)
-        slope = self.mesh.weights * np.stack([-s, c])
-        turned = np.einsum("aln,ab,bl->ln", slope, self.closing, (slope * v).sum(axis=2))
-        return np.asarray((own + self._bend(theta)) * v + others + turned)
+        u = unit_tangents(theta)
+        bend = self._coupled(u * v) - v * self._coupled(u)
+        ends = self._chord(u * v) + self._chord(u) * v
+        return np.asarray((u.conj() * bend - self.closed * ends * self.weights * u).real)
 
     def second(self, theta: Nodal, v: Nodal, w: Nodal) -> Nodal:
         """Second derivative of the gradient along v and w."""
-        s, c = np.sin(theta), np.cos(theta)
-
-        def both(x: Nodal) -> Nodal:
-            turned = s * multiply(s * x, self.matrix.T) + c * multiply(c * x, self.matrix.T)
-            return np.asarray(turned)
-
-        whole = both(np.ones_like(theta))
-        chorded = v * w * whole - v * both(w) - w * both(v) + both(v * w)
-        return np.asarray(chorded + self._closed_second(theta, v, w))
-
-    def _closed_second(self, theta: Nodal, v: Nodal, w: Nodal) -> Nodal:
-        """Second derivative of ``(Q d)·∂d/∂θ`` along v and w, by the product rule."""
-        s, c = np.sin(theta), np.cos(theta)
-        slope, bend, third = (
-            self.mesh.weights * np.stack(pair) for pair in ((-s, c), (-c, -s), (s, -c))
-        )
-
-        def along(row: Float[np.ndarray, "2 lanes nodes"]) -> Float[np.ndarray, "2 lanes 1"]:
-            return np.asarray(np.einsum("ab,bl->al", self.closing, row.sum(axis=2))[:, :, None])
-
-        total = third * v * w * self._closed(theta) + bend * v * along(slope * w)
-        total = total + bend * w * along(slope * v) + slope * along(bend * v * w)
-        return np.asarray(total.sum(axis=0))
+        u = unit_tangents(theta)
+        bend = v * self._coupled(u * w) + w * self._coupled(u * v)
+        bend = bend - v * w * self._coupled(u) - self._coupled(u * v * w)
+        ends = self._chord(u * v * w) + self._chord(u) * v * w
+        ends = ends + self._chord(u * v) * w + self._chord(u * w) * v
+        return np.asarray((u.conj() * bend + self.closed * ends * self.weights * u).imag)
 
 
 Angles = Float[np.ndarray, "lanes unknowns"]
@@ -162,31 +200,38 @@ def lower_triangle(
     entries = np.empty((lanes, (n + m) * (n + m + 1) // 2))
     for start in range(0, lanes, BLOCK):
         some = slice(start, start + BLOCK)
-        angles = _angles(theta[some], pull[some], stiffness, area.matrix[inner, inner])
-        if area.closing.any():
-            _close(angles, theta[some], pull[some], area.closing, area.mesh.weights[inner])
+        angles = pressed_rows(theta[some], pull[some], stiffness, area.part(inner))
         entries[some, : n * (n + 1) // 2] = angles.T
-    entries[:, _row_ends(0, n)] += diagonal
-    for k, stop in enumerate(_row_ends(n, n + m)):
+    entries[:, row_ends(0, n)] += diagonal
+    for k, stop in enumerate(row_ends(n, n + m)):
         first = stop - n - k
         entries[:, first : first + n] = border[:, k]
         entries[:, first + n : stop + 1] = trailing[:, k, : k + 1]
     return entries
 
 
-def _angles(
-    theta: Angles, pull: Float[np.ndarray, "lanes 1"], stiff: Square, area: Square
+def pressed_rows(
+    theta: Angles, pull: Float[np.ndarray, "lanes 1"], stiff: Square, area: EnclosedArea
 ) -> Float[np.ndarray, "entries lanes"]:
-    """Rows of the angles, lanes last, so that every operation runs along memory."""
+    """Rows ``K_ij − p ∂²V/∂θ_i∂θ_j`` of the angles, and K alone on the diagonal.
+
+    Lanes come last, so that every operation runs along memory.
+    """
     sine, cosine = np.ascontiguousarray(np.sin(theta).T), np.ascontiguousarray(np.cos(theta).T)
     pressed_sine, pressed_cosine = (-pull[:, 0] * field for field in (sine, cosine))
+    slanted = area.even.any()
     out = np.empty((len(stiff) * (len(stiff) + 1) // 2, len(theta)))
-    for i, stop in enumerate(_row_ends(0, len(stiff))):
+    for i, stop in enumerate(row_ends(0, len(stiff))):
         row, before = out[stop - i : stop + 1], slice(0, i + 1)
         np.multiply(pressed_cosine[i], sine[before], out=row)
         row -= pressed_sine[i] * cosine[before]
-        row *= area[i, before, None]
+        row *= area.matrix[i, before, None]
         row += stiff[i, before, None]
+        if slanted:
+            across = pressed_cosine[i] * cosine[:i] + pressed_sine[i] * sine[:i]
+            row[:-1] += area.even[i, :i, None] * across
+    if area.closed:
+        _close(out, theta, pull, area)
     return out
 
 
@@ -194,14 +239,13 @@ def _close(
     out: Float[np.ndarray, "entries lanes"],
     theta: Angles,
     pull: Float[np.ndarray, "lanes 1"],
-    closing: Float[np.ndarray, "2 2"],
-    weights: Float[np.ndarray, " unknowns"],
+    area: EnclosedArea,
 ) -> None:
-    """Subtract ``p (∂d/∂θ_i)ᵀ Q ∂d/∂θ_j`` off the diagonal of the rows of the angles."""
-    slope = weights[:, None] * np.stack([-np.sin(theta).T, np.cos(theta).T])
-    pressed = pull[:, 0] * np.einsum("ab,bnl->anl", closing, slope)
-    for i, stop in enumerate(_row_ends(0, theta.shape[1])):
-        out[stop - i : stop] -= (pressed[:, i : i + 1] * slope[:, :i]).sum(axis=0)
+    """Add ``p Re(q ∂d/∂θ_i ∂d/∂θ_j)`` to the rows of the angles, off the diagonal."""
+    arms = (area.weights * unit_tangents(theta)).T
+    pressed = pull[:, 0] * area.closed * arms
+    for i, stop in enumerate(row_ends(0, theta.shape[1])):
+        out[stop - i : stop] += (pressed[i] * arms[:i]).real
 
 
 def closing(moves: tuple[Sequence[int], Sequence[int]], slide: float) -> Float[np.ndarray, "2 2"]:
@@ -235,7 +279,7 @@ def closing(moves: tuple[Sequence[int], Sequence[int]], slide: float) -> Float[n
     return np.asarray(0.5 * sign * np.array([[-s, c], [c, s]]))
 
 
-def _row_ends(first: int, stop: int) -> Int[np.ndarray, " rows"]:
+def row_ends(first: int, stop: int) -> Int[np.ndarray, " rows"]:
     """Entries on the diagonal of some rows of a lower triangle."""
     rows = np.arange(first, stop)
     return rows * (rows + 3) // 2

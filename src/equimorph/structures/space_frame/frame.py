@@ -13,8 +13,8 @@ from equimorph.errors import InputError
 from equimorph.model import Descriptor, remember_call
 from equimorph.structures.contract import Readers, Symmetry, Written
 from equimorph.structures.discrete import STEPS, SURE
-from equimorph.structures.frame.any_model import Actuators, Loads, Patterns
 from equimorph.structures.frame.images import SpatialImage, find_images
+from equimorph.structures.frame.patterns import Actuators, Loads, Patterns
 from equimorph.structures.network import Joints
 from equimorph.structures.newton import newton
 from equimorph.structures.resolution import SMALLEST_IN_SPACE

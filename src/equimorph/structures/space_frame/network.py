@@ -1,6 +1,6 @@
 """The network of a frame in space: joints, pieces of members, and what turns with each joint."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 from functools import cached_property
@@ -10,7 +10,7 @@ import numpy as np
 
 from equimorph.arrays import Float, Int
 from equimorph.errors import InputError
-from equimorph.structures.frame.any_model import WEIGHT, AnyFrameNetwork
+from equimorph.structures.frame.any_network import PRESSURE, WEIGHT, AnyFrameNetwork
 from equimorph.structures.network import Joints, edges_between, places_of_joints, supported_joints
 from equimorph.structures.space_frame.member import (
     BALL,
@@ -112,6 +112,13 @@ class SpatialNetwork(AnyFrameNetwork):
     def has_rigid_member(self, joint: int) -> bool:
         """Whether a member is rigidly joined to a joint."""
         return self._rigid[joint]
+
+    def press(self, joints: Sequence[str], what: str) -> Float[np.ndarray, " pieces"]:
+        """Refuse pressure: it has no potential on a curve in space."""
+        raise InputError(
+            f"`{what}` must act on a planar frame; got joints in space ({', '.join(joints)}): "
+            "pressure has no potential on a curve there. Use dead line loads."
+        )
 
     def bears(
         self, forces: Float[np.ndarray, "joints 3"], couples: Float[np.ndarray, " joints"]
@@ -248,7 +255,7 @@ def spatial_network(
         For joints without place or members, members between unknown or equal joints, arcs that do
         not reach, impossible hinges, unknown supports, or joints that are not connected.
     """
-    names, places = places_of_joints(joints, system, (3,), reserved=(WEIGHT,))
+    names, places = places_of_joints(joints, system, (3,), reserved=(WEIGHT, PRESSURE))
     made = tuple(SpatialMember.read(each).measured(system) for each in members)
     ends, owner = edges_between(made, names)
     held = [NO_SUPPORT] * len(names)
