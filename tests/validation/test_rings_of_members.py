@@ -125,3 +125,21 @@ def test_opposite_points_touch_at_the_published_pressure():
         touch = em.lift(inward.state, {"p": 12.0}, within=[apart >= -2.0]).end
     assert touch.kind == "constraint"
     assert touch.state["p"] == pytest.approx(CONTACT, abs=5e-4)
+
+
+@pytest.mark.parametrize("pressure", [1.5, -2.0])
+def test_rings_vibrate_as_in_closed_form(pressure):
+    """ω² = n² (n² − 1) (n² − 1 − p) / (n² + 1) of a free ring of EI, R and mass per length of 1.
+
+    A quarter whose ends slide along two lines of symmetry has the even n. It is the form without
+    pressure, and zero where the ring buckles, as stiffness is linear in p. 1e-7: the default
+    elements.
+    """
+    joints = {"A": (0, -1), "B": (1, 0)}
+    supports = {"A": {"x": "held", "angle": "held"}, "B": {"y": "held", "angle": "held"}}
+    arc = Member(("A", "B"), curvature=1.0, mass=0.5 * np.pi)
+    quarter = Frame(joints, [arc], supports, {"p": {"pressure": ["A", "B"]}}, elements=4)
+    squares = np.array([2.0, 4.0, 6.0]) ** 2
+    wanted = squares * (squares - 1.0) * (squares - 1.0 - pressure) / (squares + 1.0)
+    found = loaded(quarter, p=pressure).natural_frequencies(3)
+    np.testing.assert_allclose(found, np.sqrt(wanted), rtol=1e-7)
