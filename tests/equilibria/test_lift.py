@@ -258,3 +258,22 @@ def test_supercritical_side_branches_are_followed_from_their_own_states():
     """x = √a from a = 1 to 4 keeps its side of the symmetry."""
     path = em.lift(pitchfork_form(1.0).state(-1.0, a=1.0), {"a": 4.0})
     assert path.end.state.z[0] == pytest.approx(-2.0, rel=1e-12)
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_a_constraint_that_jumps_is_named(count):
+    """Stability under another load is lost at x_l = 1 at once; the box of the other is far off."""
+    spring = em.Spring()
+    start = spring.natural_state(x_l=1.2)
+    bounds = [
+        em.outside(spring, em.Box(x_l=(0.7, 0.8), F=(-0.1, 0.1))) >= 0,
+        em.stable_over(spring, "F", (-0.01, 0.01)),
+    ]
+    starts = (
+        start
+        if count == 1
+        else em.States(spring, *(np.tile(a, (2, 1)) for a in (start.z, start.p)))
+    )
+    ended = em.lift(starts, {"x_l": 0.8, "F": 0.05}, within=bounds)
+    details = [ended.end.detail] if count == 1 else list(ended.detail.values())
+    assert details == count * [str(bounds[1])]

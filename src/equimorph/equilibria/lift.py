@@ -22,7 +22,7 @@ from equimorph.equilibria.legs import (
     violations,
     way_points,
 )
-from equimorph.equilibria.paths import Event, Path, lift_one
+from equimorph.equilibria.paths import AHEAD, Event, Path, active_constraints, lift_one
 from equimorph.equilibria.trace import Traces, trace
 from equimorph.equilibria.trace_options import EventCode, EventKind, TraceOptions
 from equimorph.errors import InputError
@@ -181,6 +181,7 @@ class _Ledger:
     def __post_init__(self) -> None:
         lanes = len(self.begun)
         self.z, self.p = self.begun.z.copy(), self.begun.p.copy()
+        self._ahead = self.p.copy()
         self.at, self.length = np.zeros(lanes), np.zeros(lanes)
         self.index = self.begun.structure.index(self.z, self.p)
         self.over = violations(self.begun, self.within)
@@ -200,6 +201,7 @@ class _Ledger:
     def enter(self, lanes: Some, curve: Curve, outcome: Traces, number: int) -> None:
         """Take up the outcome of a leg."""
         self.z[lanes], self.p[lanes] = curve.states(outcome.z, outcome.t)
+        self._ahead[lanes] = curve.states(outcome.z, outcome.t + AHEAD)[1]
         self.code[lanes], self.index[lanes] = outcome.code, outcome.index
         self.at[lanes] = number + outcome.t
         self.length[lanes] += outcome.travelled
@@ -227,8 +229,8 @@ class _Ledger:
         kind = _kinds(self.code)
         met = np.flatnonzero(self.code == EventCode.CONSTRAINT)
         if len(met):
-            excess = np.array([c.excess(self.z[met], self.p[met]) for c in within])
-            worst = excess.argmax(axis=0)
+            given = self.z[met], self.p[met], self._ahead[met]
+            worst = active_constraints(within, *given)
             for lane, which in zip(met, worst, strict=True):
                 self.detail[int(lane)] = str(within[which])
             for which in np.unique(worst):  # lanes that begin beyond have met nothing

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from equimorph.arrays import Float, Int, Lanes, Some, Values
+from equimorph.arrays import Float, Int, Lanes, Numbers, Parameters, Some, Values
 from equimorph.equilibria.critical import criticality
 from equimorph.equilibria.curves import Curve, ParameterLine
 from equimorph.equilibria.hidden_events import (
@@ -24,9 +24,12 @@ from equimorph.errors import InputError
 from equimorph.model import Constraint, Descriptor, Progress
 from equimorph.structures import State, States
 from equimorph.tables import Table, Tabular
+from equimorph.tolerances import FEASIBLE
 
 JOINED = 1e-8
 """Distance in the metric within which a leg ends where the next one begins."""
+AHEAD = 1e-9
+"""Part of a leg beyond the end of a lift where constraints are looked at that jump there."""
 NOTHING = 1e-9
 """Value, relative to the largest on the path, that counts as zero: it may begin or end there."""
 
@@ -240,6 +243,17 @@ def _vanishing_events(curve: Curve, z: Lanes, outcome: Traces) -> list[tuple[flo
     return found
 
 
+def active_constraints(
+    within: tuple[Constraint, ...], z: Lanes, p: Parameters, ahead: Parameters
+) -> Numbers:
+    """Which constraint ends each lane; one that jumps may show it just beyond the end only."""
+    excess = np.array([each.excess(z, p) for each in within])
+    jumps = np.flatnonzero(excess.max(axis=0) < -FEASIBLE)
+    if len(jumps):
+        excess[:, jumps] = [each.excess(z[jumps], ahead[jumps]) for each in within]
+    return np.asarray(excess.argmax(axis=0))
+
+
 def _end(curve: Curve, outcome: Traces, number: int, within: tuple[Constraint, ...]) -> Event:
     code, t = int(outcome.code[0]), outcome.t
     z, p = _states(curve, outcome.z, t)
@@ -247,7 +261,8 @@ def _end(curve: Curve, outcome: Traces, number: int, within: tuple[Constraint, .
     kind: str = EventCode(code).kind
     detail, critical = outcome.why.get(0, ""), None
     if code == EventCode.CONSTRAINT:
-        worst = max(within, key=lambda c: c.excess(z, p)[0])
+        ahead = _states(curve, outcome.z, t + AHEAD)[1]
+        worst = within[int(active_constraints(within, z, p, ahead)[0])]
         kind, detail, critical = worst.event, str(worst), worst.criticality(z, p)[0] or None
     if code == EventCode.FOLD and not curve.folds_change_index:
         detail = "the Jacobian of the descriptors by the unknown parameters is singular"

@@ -151,13 +151,6 @@ def orthonormal_lanes(rows, count, weights):
                     rows[lane, i, n] *= scale
 
 
-@njit(**FLAGS)
-def count_negative(matrices, out):
-    """Negative eigenvalues of each symmetric matrix (lanes, n, n)."""
-    for lane in range(matrices.shape[0]):
-        out[lane] = factor_symmetric(matrices[lane].copy())[0]
-
-
 @njit(**INNER)
 def read_lanes(source, position, lane_step, count, target, row, step):
     """Read `count` consecutive entries of each lane into rows `step` apart; see `transpose`."""
