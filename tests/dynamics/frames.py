@@ -52,5 +52,20 @@ FRAMES = {
             {"A": "fixed", "C": "pinned"}, {"P": {"D": (0, -1)}},
         ), {"P": 1.0},
     ),
+    "a ring under pressure": (
+        em.Frame(
+            {"A": (0, -1), "B": (1, 0), "C": (0, 1), "D": (-1, 0)},
+            [member("A", "B", curvature=1.0), member("C", "B", curvature=-1.0),
+             member("C", "D", curvature=1.0), member("D", "A", curvature=1.0)],
+            {"A": "pinned", "C": "x"},
+            {"p": {"pressure": ["A", "B", "C", "D", "A"]}, "F": {"A": (0, 1), "C": (0, -1)}},
+        ), {"p": 1.5, "F": 0.4},
+    ),
+    "pressure around a corner": (
+        em.Frame(
+            {"A": (0, 0), "B": (0, 1), "C": (1, 0)}, [member("A", "B"), member("C", "B")],
+            {"A": "fixed", "C": "y"}, {"p": {"pressure": ["A", "B", "C"]}},
+        ), {"p": 1.0},
+    ),
 }  # fmt: skip
 """Frame, and what it is lifted to."""

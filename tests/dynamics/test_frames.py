@@ -44,6 +44,23 @@ def test_mujoco_rests_where_the_chains_have_their_equilibrium(name):
     assert np.abs(made.linkage.places(plant.v) - found.places).max() < 2e-5
 
 
+@pytest.mark.parametrize("name", FRAMES)
+def test_chains_rest_where_their_potential_is_critical(name):
+    """Its gradient is one of closures, at what may move; 1e-6: central differences of 1e-5."""
+    state = loaded(name)
+    made = LinkageModel(ChainedFrame(state.structure, 6))
+    found, linkage, step = made.balance(state), made.linkage, 1e-5
+    ways = step * np.eye(linkage.size)[linkage.free]
+
+    def change(function):
+        return [(function(found.v + way) - function(found.v - way)) / (2 * step) for way in ways]
+
+    slope = np.array(change(lambda v: linkage.potential(v, found.y)))
+    closures = np.array(change(lambda v: linkage.closure(v).ravel()))
+    multipliers = np.linalg.lstsq(closures, -slope, rcond=None)[0]
+    np.testing.assert_allclose(slope, -closures @ multipliers, atol=1e-6)
+
+
 @pytest.mark.slow
 def test_lees_frame_snaps_where_it_folds():
     """The load limit of the inextensible frame [LeeManuelRossow1968]_ is P L²/EI = 18.5588."""

@@ -5,11 +5,11 @@ from itertools import pairwise
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from equimorph.arrays import Float
+from equimorph.arrays import Float, Int
 from equimorph.dynamics.chain_entries import PlanarChained
 from equimorph.dynamics.linkage import Bends, Linkage, Supports
 from equimorph.dynamics.mechanism import Vector
-from equimorph.errors import InputError, MissingError
+from equimorph.errors import MissingError
 from equimorph.structures import Frame, State, States
 from equimorph.structures.frame.model import FrameModel
 from equimorph.structures.rod.units import FOUR_PI_SQUARED
@@ -38,6 +38,8 @@ def frame_linkage(frame: Frame, links: int, masses: Float[np.ndarray, " members"
     axial = [np.inf if each.EA is None else float(each.EA) / unit for each in made.members]
     strains = np.zeros((members, links, count))
     strains[..., :-1] = (patterns.length / model.lengths).T[:, None]
+    pressure = np.zeros((members, count))
+    pressure[:, :-1] = patterns.pressures.T
     return Linkage(
         _supports(model),
         made.ends,
@@ -49,8 +51,22 @@ def frame_linkage(frame: Frame, links: int, masses: Float[np.ndarray, " members"
         forces,
         couples,
         node_forces,
-        np.zeros((members, count)),
+        pressure,
+        _poles(model),
     )
+
+
+def _poles(model: FrameModel) -> Int[np.ndarray, "settings 2"]:
+    """Nodes in whose x and y the end of a chain stays that moves along the other axis."""
+    found = np.zeros((model.patterns.count + 1, 2), int)
+    for chain in model.chains:
+        row = found[chain.scalar - model.multipliers]
+        row[:] = chain.ends[0]
+        for end in chain.ends:
+            held = np.isinf(model.supports[end, :2])
+            if held.any():
+                row[held] = end
+    return found
 
 
 def _supports(model: FrameModel) -> Supports:
@@ -111,11 +127,6 @@ class ChainedFrame(PlanarChained):
     def __init__(self, frame: Frame, links: int) -> None:
         self.structure, self._frame, self.links = frame, frame, links
         self.length, self.energy = frame.model.length, frame.energy_scale
-        if frame.pressure is not None:
-            raise InputError(
-                '`simulator` must cover the frame; got "mujoco" for one under pressure. '
-                'simulator="own" covers it.'
-            )
         known = frame.model.masses
         if known is None:
             raise MissingError(

@@ -80,6 +80,9 @@ class Linkage(Mechanism):
         Dead forces on the nodes.
     pressure
         Force per length towards the left of each member.
+    poles
+        For each setting that is a pressure on several members, the nodes whose x and whose y is
+        that of the place about which their area counts; None: the start of the first member.
     """
 
     supports: Supports
@@ -93,6 +96,7 @@ class Linkage(Mechanism):
     couples: Float[np.ndarray, "entries settings"]
     node_forces: Float[np.ndarray, "nodes 2 settings"]
     pressure: Float[np.ndarray, "members settings"]
+    poles: Int[np.ndarray, "settings 2"] | None = None
 
     # --- numbering ------------------------------------------------------------------------------
 
@@ -321,6 +325,9 @@ class Linkage(Mechanism):
         places = self.places(v)
         out -= float(v @ (self.couples @ y)) + float(((self.forces @ y) * places).sum())
         out -= float(((self.node_forces @ y) * self.node_places(v)).sum())
-        arms, links = places[:, :-1] - places[:, :1], self.links(v)
-        areas = 0.5 * (arms[..., 0] * links[..., 1] - arms[..., 1] * links[..., 0]).sum(axis=1)
-        return float(out + (self.pressure @ y) @ areas)
+        poles = np.tile(places[0, 0], (len(y), 1))
+        if self.poles is not None:
+            poles = (self.supports.places @ y)[self.poles, [0, 1]]
+        arms, links = places[:, None, :-1] - poles[:, None], self.links(v)[:, None]
+        areas = 0.5 * (arms[..., 0] * links[..., 1] - arms[..., 1] * links[..., 0]).sum(axis=2)
+        return float(out + (self.pressure * areas).sum(axis=0) @ y)

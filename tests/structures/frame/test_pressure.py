@@ -248,13 +248,6 @@ def test_states_that_elements_do_not_resolve_are_said_to_be_none():
         assert bool(frame.resolved(*given)[0]) is enough
 
 
-def test_mujoco_does_not_cover_pressure_on_frames():
-    """The equations of the frame itself do."""
-    frame = ring(3)
-    with pytest.raises(em.errors.InputError, match='"mujoco" for one under pressure'):
-        em.replay({"p": 1.0}, frame.natural_state(), rate=0.1)
-
-
 @pytest.mark.slow
 def test_the_set_of_an_arch_under_pressure_and_a_load_is_clean():
     """Four components where the largest curvature is 6 at most; nothing random is missing."""
