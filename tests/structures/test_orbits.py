@@ -35,7 +35,7 @@ def closing(pinned):
 def bare_spectrum(rod, state):
     """Residual, and eigenvalues in the metric, without the phase condition, by dense algebra."""
     description = replace(rod.description, phase=False)
-    bare = SpatialMechanics(description.in_own_parameters(description.raw_model(*rod._resolution)))
+    bare = SpatialMechanics(description.in_own_parameters(description.raw_model(*rod.resolution)))
     p = np.array([[state.parameters.get(name, 0.0) for name in bare.model.names]])
     z, n = state.z[None, :-1], bare.unknowns
     full = bare.layout.dense(bare.entries(z, p))[0]
