@@ -8,6 +8,7 @@ way around x_l > 1.
 import numpy as np
 import pytest
 
+from equimorph.errors import InputError
 from equimorph.manifold import equilibrium_set
 from equimorph.model import Box
 from equimorph.structures import Spring, State
@@ -113,3 +114,8 @@ def test_a_demand_made_twice_counts_once(spring_set, start):
         "start and goal are connected by stable states, but not within "
         "angle <= 1.4 and margin >= 0.45"
     )
+
+
+def test_a_route_to_its_start_is_a_loop_that_needs_way_points(spring_set, start):
+    with pytest.raises(InputError, match="`goal` must differ from `start` without `via`"):
+        plan(spring_set, start, start)

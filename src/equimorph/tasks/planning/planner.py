@@ -103,7 +103,7 @@ def plan(  # noqa: PLR0913  # the knobs of the public face, most by keyword
     wish: Wish = "length" if isinstance(objective, Extreme) else objective
     demands = Demands.of(eset.structure, wish, (*eset.constraints, *within), margin)
     ends = (start, goal)
-    check_ends(eset, ends)
+    check_ends(eset, ends, loop=via is not None)
     corners = None if via is None else _check_corners(eset, start, goal, via)
     _check_price(snap_price, via, extreme)
     if survive is not None and snap_price is not None:

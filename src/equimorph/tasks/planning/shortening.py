@@ -98,9 +98,9 @@ class Shortener:
         return lengths
 
     def _curve_along(self, path: States, count: int) -> Curves | None:
-        """Curve along a path, of about so many nodes; None if one of them meets a wall."""
+        """Curve along a path, of about so many nodes; None of one node, or if one meets a wall."""
         nodes = self._nodes(path, count)
-        return None if nodes is None else self._steps.curve(nodes)
+        return None if nodes is None or len(nodes) < 2 else self._steps.curve(nodes)
 
     def _nodes(self, path: States, count: int) -> States | None:
         """States along a path, about as many as given; None if lifts fail.

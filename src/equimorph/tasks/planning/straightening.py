@@ -9,6 +9,7 @@ from equimorph.arrays import Bool, Flags, Int, Lanes, Parameters, Some, Values
 from equimorph.equilibria import Guards, ParameterLine, TraceOptions, settle
 from equimorph.equilibria.trace import trace
 from equimorph.equilibria.trace_options import EventCode
+from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Descriptor, position
 from equimorph.structures import States
@@ -223,11 +224,17 @@ def follow_direction(corners: States, ends: Ends) -> States:
     return States(corners.structure, corners.z[::-1].copy(), corners.p[::-1].copy())
 
 
-def check_ends(eset: EquilibriumSet, ends: Ends) -> None:
-    """Raise `InputError` unless start and goal are equilibria of the set's problem."""
+def check_ends(eset: EquilibriumSet, ends: Ends, *, loop: bool = False) -> None:
+    """Raise `InputError` unless start and goal are equilibria of the set's problem.
+
+    They must be different, but for a loop.
+    """
     for name, state in zip(("start", "goal"), ends, strict=True):
         check_equilibrium(name, state)
         check_fixed_parameters(name, state, eset)
+    same = all(np.array_equal(getattr(ends[0], part), getattr(ends[1], part)) for part in "zp")
+    if same and not loop:
+        raise InputError("`goal` must differ from `start` without `via`; got the same state.")
 
 
 def violation(ends: Ends, demands: Demands) -> str:
