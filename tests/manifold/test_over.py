@@ -6,6 +6,7 @@ import pytest
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet, equilibrium_set
 from equimorph.manifold.lookup.over import Sheets
+from equimorph.manifold.lookup.rims import nearest_rims
 from equimorph.model import Box
 from equimorph.structures import Spring, States
 from oracles.surfaces import sphere, torus
@@ -233,9 +234,10 @@ def test_only_the_nearest_rims_of_a_point_are_crossed(spring_set, monkeypatch):
     """Of all rims near a point as many as are allowed, at the least distances."""
     sheets = spring_set._sheets
     near = sheets.above.near(spring_set.coordinates[spring_set.folds[0].ravel()[:40]])
-    hit, corner = sheets._nearest_rims(near, np.ones(len(near.cell), bool))
-    monkeypatch.setattr("equimorph.manifold.lookup.over.RIMS", 1)
-    few, of_few = sheets._nearest_rims(near, np.ones(len(near.cell), bool))
+    asked = near, sheets._brims, np.ones(len(near.cell), bool), sheets.above
+    hit, corner = nearest_rims(*asked)
+    monkeypatch.setattr("equimorph.manifold.lookup.rims.RIMS", 1)
+    few, of_few = nearest_rims(*asked)
     away = np.abs(near.weights[hit, corner]) / np.linalg.norm(
         sheets.above.maps[near.cell[hit], corner, :-1] / sheets.above.width, axis=1
     )

@@ -25,7 +25,7 @@ from equimorph.arrays import (
 )
 from equimorph.linalg.lanes import in_background, threads
 from equimorph.manifold.geometry.topology import adjacency, senses
-from equimorph.manifold.lookup.cell_index import NUDGE, CellIndex, Hits, Rims, cells_beside
+from equimorph.manifold.lookup.cell_index import NUDGE, CellIndex, Hits
 from equimorph.manifold.lookup.exact_states import (
     CLOSEST,
     Points,
@@ -37,6 +37,7 @@ from equimorph.manifold.lookup.exact_states import (
 )
 from equimorph.manifold.lookup.kernels import balanced, guesses, one_of_each, worth_trying
 from equimorph.manifold.lookup.near_crossings import NearCrossings
+from equimorph.manifold.lookup.rims import Rims, cells_beside, nearest_rims, ways_out
 from equimorph.model import Constraint, are_feasible
 from equimorph.structures import States, Structure
 from equimorph.tolerances import SAME_SOLUTION, SAME_STATE
@@ -46,9 +47,6 @@ OVERHANG = 0.3
 PARTNERS = 3
 """Rounds in which states are looked for across folds, over points where some are missing. Of 15
 first rounds 13 brought states, of two second ones none."""
-RIMS = 64
-"""Rims, the nearest ones, across which states over one point are lifted. A set in shreds, of a
-chain, had 690 near a point, which took minutes; clean sets hardly ever ask for any."""
 CHUNK = 512
 """Points that are served together: their work arrays stay small."""
 
@@ -351,12 +349,9 @@ class Sheets:
         )
         # cells without volume have no maps, and nothing is across from their corners
         missed = (surplus[near.point] != 0.0) & np.isfinite(self.above.maps[cell, 0, 0])
-        hit, corner = self._nearest_rims(near, missed)
-        out = -self.above.maps[cell[hit], corner, :-1] / self.above.width
-        length = np.linalg.norm(out, axis=1, keepdims=True)
+        hit, corner = nearest_rims(near, self._brims, missed, self.above)
         sides = self.points.p[:, self.free][self.cells[cell[hit]]]
-        reach = np.ptp(sides, axis=1).max(axis=1, keepdims=True)
-        way = out / np.maximum(length, 1e-300) * reach
+        way = ways_out(cell[hit], corner, sides, self.above)
         first, last = (np.searchsorted(point, near.point[hit], side) for side in ("left", "right"))
         number = np.repeat(np.arange(len(hit)), last - first)
         state = np.concatenate([np.zeros(0, int), *map(np.arange, first, last)])
@@ -370,17 +365,6 @@ class Sheets:
         )
         found, of_found = self._exact(found, p, point[state[which]], near)
         return found, of_found
-
-    def _nearest_rims(self, near: Hits, missed: Flags) -> tuple[Some, Some]:
-        """Hits at rims, and the corners that these are opposite to; the nearest ones of a point."""
-        hit, corner = np.nonzero(self._brims[near.cell] & missed[:, None])
-        slope = self.above.maps[near.cell[hit], corner, :-1] / self.above.width
-        away = np.abs(near.weights[hit, corner]) / np.linalg.norm(slope, axis=1)
-        point = near.point[hit]
-        order = np.lexsort((away, point))
-        rank = np.arange(len(order)) - np.searchsorted(point[order], point[order])
-        kept = np.sort(order[rank < RIMS])
-        return hit[kept], corner[kept]
 
     def _exact(
         self, starts: Lanes, p: Points, owner: Numbers, near: Hits
