@@ -160,9 +160,10 @@ EXAMPLES = (
             "space-sideways": "The arch with Θ = 0.9, Δ = 0 under the uniform load, made of a "
             "round rod (GJ/EI = 0.77). Black: states in the plane, upright and inverted; red: the "
             "pair of states beside it, mirror images of each other; full lines: stable in space, "
-            "dotted: unstable. Left the height of the middle, middle its distance from the plane, "
-            "right the arch seen along its chord, with the load. Between both branch points a "
-            "round rod swings sideways and turns inside out under a growing load, without a snap.",
+            "dotted: unstable. Left the height y of the middle, middle its distance z from the "
+            "plane, right the arch seen along its chord, with the load. Between both branch "
+            "points a round rod swings sideways and turns inside out under a growing load, "
+            "without a snap.",
         },
     ),
     Example(

@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from scipy.optimize import brentq
 
 import equimorph as em
@@ -91,8 +92,10 @@ def space_route(folder: Path, widths: int = 60) -> dict[str, float]:
         over.semilogx(ratios, least, color="#1a1a1a", linewidth=1.3)
         for ax in (along, over):
             ax.axhline(0.0, color="#8c8c8c", linewidth=0.6)
-        along.set(xlabel="progress along the way", ylabel="lowest lateral eigenvalue")
-        over.set(xlabel="width/thickness", ylabel="smallest on the way", xlim=(1.0, 40.0))
+        along.set(xlabel="progress along the route", ylabel="lowest lateral eigenvalue (4π²B/L)")
+        over.set(
+            xlabel="width / thickness", ylabel="smallest on the route (4π²B/L)", xlim=(1.0, 40.0)
+        )
         over.set_xticks([1, 2, 5, 10, 20, 40], ["1", "2", "5", "10", "20", "40"])
         over.minorticks_off()
         along.legend(title="section", ncols=2)
@@ -108,7 +111,7 @@ LIMITS = np.log([0.02, 50.0])
 """Logarithms of the stiffnesses out of the plane between which the least one is searched."""
 
 
-def space_stiffness(folder: Path, settings: tuple[int, int] = (17, 17)) -> dict[str, float]:
+def space_stiffness(folder: Path, settings: tuple[int, int] = (25, 25)) -> dict[str, float]:
     """Find the least stiffness for the way inside out, and for loading over both end angles."""
     way = way_inside_out().states
     numbers = {
@@ -141,6 +144,7 @@ def space_stiffness(folder: Path, settings: tuple[int, int] = (17, 17)) -> dict[
 
 SIDE = 0.01
 """Force across the plane, by λ_cr, that says to which side the arch swings."""
+LOAD_LABEL = "load q (4π²B/L²)"
 BRANCHING = -1e-9
 """Least margin of states that are not unstable: it is zero, up to round-off, at branch points."""
 SHOWN = (1.65, 1.8, 2.0, 2.2, 2.4)
@@ -179,9 +183,13 @@ def space_sideways(folder: Path) -> dict[str, float]:
             seen.plot(shape[:, 2], shape[:, 1], color=colour, linewidth=1.0)
             if q in SHOWN:
                 seen.annotate(f" {q:g}", shape[len(shape) // 2, [2, 1]], fontsize=6)
-        high.set(xlabel="load q", ylabel="height of the middle")
-        wide.set(xlabel="load q", ylabel="middle beside the plane")
-        seen.set(xlabel="beside the plane", ylabel="height", aspect="equal", xlim=(-0.02, 0.25))
+        high.set(xlabel=LOAD_LABEL, ylabel="y(½) (L)")
+        wide.set(xlabel=LOAD_LABEL, ylabel="z(½) (L)")
+        seen.set(xlabel="z (L)", ylabel="y (L)", aspect="equal", xlim=(-0.02, 0.25))
+        full = Line2D([], [], color="#1a1a1a", label="stable")
+        dotted = Line2D([], [], color="#1a1a1a", linestyle=":", label="unstable")
+        aside_line = Line2D([], [], color=COLOURS[0], label="beside the plane")
+        high.legend(handles=[full, dotted, aside_line])
         em.plotting.save(drawing, folder, "space-sideways")
     leaves, rejoins = (path.end.state["q"] for path in beside)
     return {
