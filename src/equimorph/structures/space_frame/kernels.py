@@ -22,6 +22,7 @@ from equimorph.structures.space_frame.node_kernels import (
     hinge_turns,
     lean_on_parent,
     set_turns,
+    turn_held,
     vector_sums,
 )
 from equimorph.structures.spatial.element_kernels import stiffen
@@ -80,10 +81,11 @@ def scatter(
 
 @njit(**FLAGS)
 def linearise_lanes(
-    nodes, owner, derivative, inverse, weights, tangents, arclengths, stiff, moment_of_strain, soft,
-    counts, ties, numbers, start, drop, strains, elongation, free, place, held, hinged, parents,
-    hinge_axes, hinges_of, lengths, masses, dofs, slots, edges, corners, node_slots, quadratic_at,
-    quadratic_by, constant, z, p, dp, held_turns, held_rates, shift, residual, column, entries,
+    turns_of_held, nodes, owner, derivative, inverse, weights, tangents, arclengths, stiff,
+    moment_of_strain, soft, counts, ties, numbers, start, drop, strains, elongation, free,
+    place, held, hinged, parents, hinge_axes, hinges_of, lengths, masses, dofs, slots, edges,
+    corners, node_slots, quadratic_at, quadratic_by, constant, z, p, dp, shift, residual,
+    column, entries,
 ):  # fmt: skip
     """F, F_p·dp and the entries of F_z − shift·mass after the lengths; see `Tables`."""
     lanes, size = z.shape
@@ -119,11 +121,7 @@ def linearise_lanes(
         for c in range(multipliers):
             store(y, c, load(rows, size - multipliers + c))
         store(y, scalar_count - 1, spread(1.0))
-        if len(held) > 0:
-            most = 4 * len(held)
-            read_lanes(held_turns, lane * most, most, most, held_q, 0, 1)
-            most = 3 * len(held)
-            read_lanes(held_rates, lane * most, most, most, held_v, 0, 1)
+        turn_held(turns_of_held, multipliers, y, dy, held_q, held_v)
         read_lanes(shift, lane, 1, 1, moved, 0, 1)
         set_turns(free, held, rows, held_q, w, radii)
         hinge_turns(hinged, parents, hinge_axes, 4 * unknown, rows, w, turned)

@@ -2,13 +2,13 @@
 
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import NamedTuple
 
 import numpy as np
 
-from equimorph.arrays import Entries, Flags, Float, Int, Lanes, Parameters, Sides, Values
+from equimorph.arrays import Entries, Flags, Float, Int, Lanes, Parameters, Sides
 from equimorph.linalg import BorderedSolution
 from equimorph.linalg.dense import no_border
+from equimorph.linalg.lanes import over_lanes
 from equimorph.linalg.sparse import SparseLayout
 from equimorph.structures.discrete import linearise
 from equimorph.structures.equations import AnyBorder, JointEquations, Shift, Solver
@@ -16,8 +16,8 @@ from equimorph.structures.space_frame.kernels import linearise_lanes
 from equimorph.structures.space_frame.lagrangian import SpatialFrameLagrangian
 from equimorph.structures.space_frame.model import SpatialFrameModel
 from equimorph.structures.space_frame.network import Turning
+from equimorph.structures.space_frame.reduction_kernels import eliminate_lengths, restore_lengths
 from equimorph.structures.spatial.quaternions import (
-    RIGHT,
     are_near,
     conjugate,
     exponential,
@@ -185,7 +185,8 @@ class Tables:
         rows = model.quadratic[: model.multipliers]
         at = np.argwhere(rows)
         arrays = (
-            model.nodes, model.owner, model.mesh.reference.derivative, 1.0 / model.element_lengths,
+            model.patterns.turns[:, model.held], model.nodes, model.owner,
+            model.mesh.reference.derivative, 1.0 / model.element_lengths,
             model.weights, model.tangents, model.arclengths, model.stiff, model.moment_of_strain,
             model.compliance, acting.counts, acting.ties, acting.numbers, acting.start, acting.drop,
             model.strains, model.elongation[..., None], model.free, model.place, model.held,
@@ -203,19 +204,6 @@ LARGEST_TAIL = 5e-4
 """Highest Legendre coefficients of w, half of radians, of an element that represents its part."""
 FORCES = 10.0
 """Spread of the forces of random guesses, in units of bending stiffness over length squared."""
-
-
-class Coordinates(NamedTuple):
-    """Lengths ρ of the free quaternions and rotations of them, in place of their four numbers.
-
-    radius: ρ; basis: the unit quaternion and its products with e₁, e₂, e₃, in rows; pivot: second
-    derivative by ρ; mixed: slope by the rotation over ρ.
-    """
-
-    radius: Float[np.ndarray, "lanes free"]
-    basis: Float[np.ndarray, "lanes free 4 4"]
-    pivot: Float[np.ndarray, "lanes free"]
-    mixed: Float[np.ndarray, "lanes free 3"]
 
 
 class SpatialFrameMechanics(SpatialFrameLagrangian, JointEquations):
@@ -240,20 +228,12 @@ class SpatialFrameMechanics(SpatialFrameLagrangian, JointEquations):
         self, z: Lanes, p: Parameters, dp: Parameters, shift: Shift = None
     ) -> tuple[np.ndarray, ...]:
         """F, F_p·dp, and the entries of F_z − shift·mass in rotations with F and the shift."""
-        lowered = np.zeros(len(z)) if shift is None else shift
-        y = self.scalars(z, p)
-        rates = np.zeros_like(y)
-        rates[:, self.constraints : -1] = dp
-        turns = self.held_turns(np.stack([y, rates]))
-        moved = np.einsum("kab,l...b->l...ka", RIGHT, turns[0])
-        velocity = 2.0 * np.einsum("l...ka,l...a->l...k", moved, turns[1])
-        count = len(self.model.held)
-        held = turns[0].reshape(len(z), 4 * count), velocity.reshape(len(z), 3 * count)
-        given = (z, p, dp, *held, lowered[:, None])
+        lowered = np.zeros((len(z), 1)) if shift is None else shift[:, None]
+        given = (z, p, dp, lowered)
         out = linearise(linearise_lanes, self.tables.shared, self.layout, given)
         first, last = 3 * len(self.model.free), self.tables.count
         slots = self.layout.diagonal[first:last]
-        out[2][:, slots] -= lowered[:, None] * self.mass[4 * len(self.model.free) :]
+        out[2][:, slots] -= lowered * self.mass[4 * len(self.model.free) :]
         return *out, out[0], lowered
 
     def solve(
@@ -268,73 +248,37 @@ class SpatialFrameMechanics(SpatialFrameLagrangian, JointEquations):
     ) -> Solver:
         """Solves with the matrix whose parts are given, which is reduced to rotations."""
         assert shift is None, "the parts contain it"
-        entries, residual, lowered = parts
-        at = self._coordinates(z, residual, lowered)
-        return partial(self._solve_reduced, at, entries)
-
-    # --- solves in rotations --------------------------------------------------------------------
-
-    def _coordinates(self, z: Lanes, residual: Lanes, shift: Values) -> Coordinates:
-        """Lengths and rotations at states with their F."""
-        q, slope = self.quaternions(z), self.quaternions(residual)
-        radius = np.linalg.norm(q, axis=2)
-        unit = q / radius[..., None]
-        turned = np.einsum("kab,lnb->lnka", RIGHT, unit)
-        basis = np.concatenate([unit[:, :, None], turned], axis=2)
-        pivot = 0.5 * self.model.stiff_lengths * (3.0 * radius**2 - 1.0)
-        pivot = pivot - shift[:, None] * self.mass[: self._rows : 4]
-        mixed = 0.5 * np.einsum("lnka,lna->lnk", turned, slope)
-        return Coordinates(radius, basis, pivot, mixed)
-
-    def _split(
-        self, at: Coordinates, rows: Float[np.ndarray, "lanes k size"]
-    ) -> tuple[Float[np.ndarray, "lanes k free"], Float[np.ndarray, "lanes k reduced"]]:
-        """Rows by lengths, and by rotations and all else with the lengths eliminated."""
-        lanes, k = rows.shape[:2]
-        free = rows[:, :, : self._rows].reshape(lanes, k, len(self.model.free), 4)
-        turned = np.einsum("lnka,lsna->lsnk", at.basis, free)
-        along = turned[..., 0]
-        across = 0.5 * at.radius[:, None, :, None] * turned[..., 1:]
-        across = across + (at.mixed / at.pivot[..., None])[:, None] * along[..., None]
-        flat = across.reshape(lanes, k, 3 * len(self.model.free))
-        return along, np.concatenate([flat, rows[:, :, self._rows :]], axis=2)
+        entries, *at = parts
+        return partial(self._solve_reduced, (z, *at), entries)
 
     def _solve_reduced(
-        self,
-        at: Coordinates,
-        entries: Entries,
-        rhs: Sides,
-        border: AnyBorder,
+        self, at: tuple[np.ndarray, ...], entries: Entries, rhs: Sides, border: AnyBorder
     ) -> BorderedSolution:
-        """Solve with the matrix of these entries, which is reduced to rotations."""
-        around = no_border(len(rhs), self.size) if border is None else border
-        k = around[0].shape[1]
-        columns, small_columns = self._split(at, around[0])
-        rows, small_rows = self._split(at, around[1])
-        right, small = self._split(at, rhs[:, :, : self.size])
-        weighted = rows / at.pivot[:, None]
-        corner = around[2] - np.einsum("lan,lbn->lab", weighted, columns)
-        last = rhs[:, :, self.size :] - np.einsum("lsn,lan->lsa", right, weighted)
-        given = np.concatenate([small, last], axis=2)
-        found = self.layout.solve(entries, (small_columns, small_rows, corner), given)
-        reduced = found.x.shape[2] - k
-        turns = found.x[:, :, : 3 * len(self.model.free)]
-        turns = turns.reshape(*turns.shape[:2], len(self.model.free), 3)
-        along = right + np.einsum("lnk,lsnk->lsn", at.mixed, turns)
-        along = along - np.einsum("lsa,lan->lsn", found.x[:, :, reduced:], columns)
-        along = along / at.pivot[:, None]
-        parts = np.concatenate(
-            [along[..., None], 0.5 * at.radius[:, None, :, None] * turns], axis=3
-        )
-        q = np.einsum("lnka,lsnk->lsna", at.basis, parts)
-        q = q.reshape(*q.shape[:2], self._rows)
-        x = np.concatenate([q, found.x[:, :, 3 * len(self.model.free) :]], axis=2)
+        """Solve with the matrix of these entries, which is reduced to rotations.
+
+        at: states, F and shifts.
+        """
+        columns, rows, corner = no_border(len(rhs), self.size) if border is None else border
+        free, (lanes, sides, width) = len(self.model.free), rhs.shape
+        k = columns.shape[1]
+        small = [np.empty((lanes, k, self.size - free)) for _ in range(2)]
+        small += [np.empty((lanes, k, k)), np.empty((lanes, sides, width - free))]
+        given = [np.ascontiguousarray(each) for each in (*at, columns, rows, corner, rhs)]
+        over_lanes(eliminate_lengths, self._of_lengths, given, small)
+        found = self.layout.solve(entries, (small[0], small[1], small[2]), small[3])
+        x, negative, scale = np.empty(rhs.shape), np.empty(lanes, np.int64), np.empty(lanes)
+        given = [*given[:4], given[6], found.x]
+        over_lanes(restore_lengths, self._of_lengths, given, [x, negative, scale])
         with np.errstate(over="ignore", invalid="ignore"):
-            scale = (at.pivot * (2.0 / at.radius) ** 6).prod(axis=1)
             determinant = found.determinant * scale
         determinant[~np.isfinite(determinant)] = np.nan
-        negative = found.negative + (at.pivot < 0.0).sum(axis=1)
+        negative += found.negative
         return BorderedSolution(x, negative, found.pivot_ratio, found.pivoted, determinant)
+
+    @cached_property
+    def _of_lengths(self) -> tuple[np.ndarray, np.ndarray]:
+        """Stiffness of the lengths of quaternions, and their masses."""
+        return self.model.stiff_lengths, np.ascontiguousarray(self.mass[: self._rows : 4])
 
     # --- guesses --------------------------------------------------------------------------------
 

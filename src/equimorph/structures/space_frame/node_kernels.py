@@ -1,5 +1,7 @@
 """Compiled kernels of single nodes of frames in space: turns, hinges, lengths of quaternions."""
 
+import math
+
 from equimorph.linalg.compiled import njit
 from equimorph.linalg.kernels import INNER
 from equimorph.linalg.simd import load, sincos, spread, square_root, store
@@ -16,6 +18,51 @@ def vector_sums(table, first, y, dy, out, rate):
                 change = change + spread(table[r, c]) * load(dy, first + r)
         store(out, c, total)
         store(rate, c, change)
+
+
+@njit(**INNER)
+def turn_held(vectors, first, y, dy, turns, rates):
+    """Turns of what supports hold: about the axes of the parameters, one after the other.
+
+    rates: their angular velocities on the axes of the cross-sections that turn.
+    """
+    one, two = spread(1.0), spread(2.0)
+    for h in range(vectors.shape[1]):
+        w0, w1, w2, w3 = one, spread(0.0), spread(0.0), spread(0.0)
+        v1, v2, v3 = spread(0.0), spread(0.0), spread(0.0)
+        for k in range(len(vectors)):
+            a1, a2, a3 = vectors[k, h, 0], vectors[k, h, 1], vectors[k, h, 2]
+            size = math.sqrt(a1 * a1 + a2 * a2 + a3 * a3)
+            if size == 0.0:
+                continue
+            sine, e0 = sincos(spread(0.5 * size) * load(y, first + k))
+            e1, e2, e3 = (
+                spread(a1 / size) * sine,
+                spread(a2 / size) * sine,
+                spread(a3 / size) * sine,
+            )
+            b0, b1, b2, b3 = w0, w1, w2, w3
+            w0 = b0 * e0 - b1 * e1 - b2 * e2 - b3 * e3
+            w1 = b0 * e1 + b1 * e0 + b2 * e3 - b3 * e2
+            w2 = b0 * e2 - b1 * e3 + b2 * e0 + b3 * e1
+            w3 = b0 * e3 + b1 * e2 - b2 * e1 + b3 * e0
+            # turned back: v + 2 e₀ (v × e) + 2 e × (e × v)
+            c1, c2, c3 = (
+                two * (v2 * e3 - v3 * e2),
+                two * (v3 * e1 - v1 * e3),
+                two * (v1 * e2 - v2 * e1),
+            )
+            rate = load(dy, first + k)
+            v1 = v1 + e0 * c1 + c2 * e3 - c3 * e2 + spread(a1) * rate
+            v2 = v2 + e0 * c2 + c3 * e1 - c1 * e3 + spread(a2) * rate
+            v3 = v3 + e0 * c3 + c1 * e2 - c2 * e1 + spread(a3) * rate
+        store(turns, 4 * h, w0)
+        store(turns, 4 * h + 1, w1)
+        store(turns, 4 * h + 2, w2)
+        store(turns, 4 * h + 3, w3)
+        store(rates, 3 * h, v1)
+        store(rates, 3 * h + 1, v2)
+        store(rates, 3 * h + 2, v3)
 
 
 @njit(**INNER)
