@@ -149,19 +149,12 @@ class DaskWorkers:
 
 
 def compute(task: bytes, expected: dict[str, str]) -> bytes:
-    """Compute a chunk on a worker.
-
-    Parameters
-    ----------
-    task
-        Pickle of a function and of its argument.
-    expected
-        Versions of the process that asks.
+    """Compute a chunk, the pickle of a function and of its argument, on a worker.
 
     Raises
     ------
     InputError
-        If the worker has others.
+        If the worker has other versions than the process that asks.
     """
     found = versions()
     for name, wanted in expected.items():

@@ -49,16 +49,7 @@ def outline(
 def arrange(places: OldPlaces, edges: OldEdges, jump: OldJumps) -> Drawing:
     """Edges that meet nowhere but at their ends, with the same jumps as the given ones.
 
-    Parameters
-    ----------
-    places
-        Vertices in units of the grid spacing, not yet rounded.
-    edges, jump
-        As `outline` gives them.
-
-    Returns
-    -------
-    Rounded vertices, edges and jumps.
+    Places are in units of the grid spacing, not yet rounded; those of the drawing are rounded.
     """
     places, edges, jump = _weld(places, edges, jump)
     for _ in range(ROUNDS):
@@ -102,18 +93,8 @@ def winding(
 ) -> Int[np.ndarray, " places"]:
     """Sum of the jumps that a ray in +x meets from each place.
 
-    Parameters
-    ----------
-    places
-        Where to count.
-    ends, jump
-        Edges of closed curves.
-    skip
-        For each place the number of one edge that its ray does not see.
-
-    Returns
-    -------
-    The count at each place.
+    The edges are those of closed curves; the ray of a place does not see the edge numbered in
+    `skip`.
     """
     count = np.empty(len(places), int)
     (xa, ya), (xb, yb) = ends[:, 0].T, ends[:, 1].T

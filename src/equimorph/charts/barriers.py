@@ -78,15 +78,7 @@ class Barrier:
 
 
 def barriers_of(cells: Cells, preference: Preference) -> tuple[Barrier, ...]:
-    """Barriers around the preferred cells; each is known once, from the side that ends there.
-
-    Parameters
-    ----------
-    cells
-        The preferred cells.
-    preference
-        The choice.
-    """
+    """Barriers around the preferred cells; each is known once, from the side that ends there."""
     facets, kinds = facet_kinds(cells)
     kinds = np.where(kinds == EdgeKind.CUT, EdgeKind.TIE, kinds)
     ended = flags_of(facets, cells.whole.facets[cells.whole.counts == 1]) & ~np.isin(

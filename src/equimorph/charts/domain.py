@@ -146,12 +146,7 @@ def area_of(loop: Loop) -> float:
 def without_slivers(loops: tuple[Loop, ...], size: Float[np.ndarray, " 2"]) -> tuple[Loop, ...]:
     """Loops of regions that are wider than slivers between the chords of two curves.
 
-    Parameters
-    ----------
-    loops
-        Closed outlines.
-    size
-        Extent of a typical cell.
+    `size` is the extent of a typical cell.
     """
     kept = []
     for loop in loops:

@@ -333,14 +333,8 @@ class Walker:
 def straightest_path(clear: Walker, free: Walker, path: list[int]) -> Way:
     """The shortest chain of straight ways between vertices of a path.
 
-    Parameters
-    ----------
-    clear
-        Where ways between any two of the vertices may run.
-    free
-        Where ways between neighbours on the path may run, if they may not otherwise.
-    path
-        Vertices.
+    Ways between any two of the vertices run where `clear` allows, those between neighbours on the
+    path also where only `free` does.
     """
     count = len(path)
     length = np.full(count, np.inf)

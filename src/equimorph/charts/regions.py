@@ -95,20 +95,8 @@ def count_regions(
 ) -> Regions:
     """Exact regions of the plane by the number of projected cells that cover them.
 
-    Crossings are rounded to 1e-9 of the extent of the set.
-
-    Parameters
-    ----------
-    coordinates
-        Free parameters at every vertex of the set.
-    cells
-        Vertex numbers of the cells to count: all, or those of one index.
-    overturned
-        Which of them count minus one time; none if not given.
-
-    Returns
-    -------
-    Nested regions; none at all if there is no cell.
+    The cells are all of a set, or those of one index; overturned ones count minus one time.
+    Crossings are rounded to 1e-9 of the extent of the set. Without cells there are no regions.
     """
     return regions_within(coordinates, *outline(coordinates, cells, overturned))
 

@@ -63,18 +63,8 @@ def changes_by_score(
 ) -> Float[np.ndarray, "lanes 2"]:
     """Shares of straight ways at which states tie with their best rivals, and at which these end.
 
-    Not numbers where they do not. The rivals are those at the start.
-
-    Parameters
-    ----------
-    score
-        What is least for the preferred state.
-    found
-        All states over the starts of the ways, those that move last.
-    stop
-        These at the ends of the ways.
-    constraints
-        What ends the rivals.
+    Not numbers where they do not. `found` are all states over the starts of the ways, and the
+    rivals are those there; `stop` are the states that move at the ends. Constraints end rivals.
     """
     structure, count = stop.structure, len(found.point) - len(stop)
     out, value = np.full((len(stop), 2), np.nan), score(found)
@@ -101,14 +91,7 @@ def shares_of_ends(
 ) -> tuple[Values, Traces]:
     """Shares of ways at which states on them end, and how they do; not numbers where they do not.
 
-    Parameters
-    ----------
-    ways
-        The ways.
-    z
-        States at their starts.
-    constraints
-        What ends states, beside folds and branch points.
+    States at the starts are `z`; besides folds and branch points constraints end them.
     """
     ended = trace(ways, z, constraints, TraceOptions(record=False))
     return np.where(np.isin(ended.code, ENDS), ended.t, np.nan), ended

@@ -15,18 +15,7 @@ from equimorph.tasks.maps.actuator_map import unloaded_base
 
 
 def check_and_show(file: Path, *, as_json: bool = False) -> int:
-    """Check a study, then show what running it would compute.
-
-    Parameters
-    ----------
-    file
-        Study file.
-    as_json
-        Whether to write data for programs instead of text.
-
-    Returns
-    -------
-    Exit code 0.
+    """Check a study, then show what running it would compute, as text or as data for programs.
 
     Raises
     ------

@@ -11,13 +11,7 @@ from equimorph.progress import ProgressBars
 
 
 def reproduce_and_show(out: Path) -> None:
-    """Reproduce the article with progress on stderr, then print the path of the report.
-
-    Parameters
-    ----------
-    out
-        Folder for figures and the report.
-    """
+    """Reproduce the article in a folder with progress on stderr, then print the report's path."""
     screen = Console(highlight=False)
     with ProgressBars() as progress:
         found = reproduce(out, progress=progress)

@@ -20,24 +20,10 @@ COMPILED = "kernels that are compiled are kept; the study had not begun"
 def run_and_show(
     file: Path, out: Path, output: Output, *, replace: bool, workers: Workers | None = None
 ) -> bool:
-    """Run a study with progress on stderr, then show its answers.
+    """Run a study with progress on stderr and show its answers; say whether one was refused.
 
-    Parameters
-    ----------
-    file
-        Study file.
-    out
-        Results folder.
-    output
-        What to write, and where.
-    replace
-        Replace the results of another study there.
-    workers
-        Who lifts the tiles of the set, and computes the rays of maps and the trials.
-
-    Returns
-    -------
-    Whether a question was refused.
+    With `replace` the results of another study in the folder give way. Workers lift the tiles of
+    the set, and compute the rays of maps and the trials.
     """
     _, _, problem = read_problem(file)
     calls = calls_of(problem)

@@ -109,13 +109,7 @@ class Measurement:
     def of(
         cls, measured: Mapping[Descriptor, float], errors: Mapping[Descriptor, float]
     ) -> "Measurement":
-        """Check measured values, and add their standard errors.
-
-        Raises
-        ------
-        InputError
-            If a descriptor has no standard error, or a value is not a number.
-        """
+        """Check measured values, and add their standard errors."""
         for each, value in measured.items():
             if each not in errors:
                 raise InputError(f"`measured` must have standard errors; got {each.name}.")

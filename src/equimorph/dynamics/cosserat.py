@@ -68,13 +68,7 @@ class CosseratModel(DirectModel):
 
 
 def _check_covered(linkage: Linkage, rest: Float[np.ndarray, "joints settings"]) -> None:
-    """Refuse by name what elements gripped at their centres do not describe.
-
-    Raises
-    ------
-    InputError
-        With what the rod has.
-    """
+    """Refuse by name what elements gripped at their centres do not describe."""
     held = linkage.supports
     others = {
         f"ends other than {ENDS}": not (

@@ -76,18 +76,8 @@ def fold_delay(
 ) -> FoldDelay:
     """Normal form of the fold near an equilibrium, for a motion that passes it at a time.
 
-    Parameters
-    ----------
-    last
-        Equilibrium close to the fold, on the stable side.
-    time
-        When the fold is met.
-    course
-        Settings by time.
-    damping
-        Damping of elastic joints over their stiffness, in the linkage's unit of time.
-    unit
-        Value of this unit in that of the course.
+    The equilibrium is close to the fold, on the stable side. Damping is that of elastic joints over
+    their stiffness, in the linkage's unit of time, whose value in the time of the course is `unit`.
     """
     linkage, unknown = last.linkage, last.linkage.unknown
     size = linkage.size

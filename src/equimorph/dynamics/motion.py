@@ -86,10 +86,7 @@ def timed_corners(
 ) -> tuple[State, TimedCorners]:
     """Start and motion of a schedule, or of way-points, with the times that are asked for.
 
-    Raises
-    ------
-    InputError
-        Without a start, without times, or with two kinds of them.
+    Refused are motions without a start, without times, or with two kinds of them.
     """
     if isinstance(schedule, Schedule):
         begin = start or first_state(schedule, structure)

@@ -285,10 +285,7 @@ def _slides(made: Construction[Build], links: int) -> Float[np.ndarray, "links 3
 def check_isolated(rod: SpatialRod, start: State) -> None:
     """Refuse states that may be turned about the axis of the clamps for nothing.
 
-    Raises
-    ------
-    InputError
-        If the start is one of an orbit, or its rod has a phase condition.
+    Such are states of orbits, and all of a rod with a phase condition.
     """
     mechanics = rod.mechanics
     pinned = isinstance(mechanics, PinnedMechanics)

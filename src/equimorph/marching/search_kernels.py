@@ -26,13 +26,7 @@ from equimorph.marching.tick_kernels import (
 
 
 def search_of(step, excess):
-    """Loop that finds folds, or violated constraints, with the kernels of a structure.
-
-    Parameters
-    ----------
-    step, excess
-        As for `tick_kernels.march_of`.
-    """
+    """Loop that finds folds, or violated constraints, with kernels as of `march_of`."""
 
     @template(**FLAGS)
     def measure(work, tables, bounds, line, block, scratch, values):

@@ -21,8 +21,6 @@ _ON_BOX = 1e-9
 def fold_pieces(eset: EquilibriumSet) -> list[tuple[Int[np.ndarray, " _"], int]]:
     """Fold curves, cut where the index of their sides changes.
 
-    Returns
-    -------
     Vertices of each piece in order, and the lower index of its two sides: 0 on the boundary of
     stability.
     """
@@ -47,15 +45,6 @@ def _cut_by_index(
 def boundary_pieces(eset: EquilibriumSet, *, box: bool) -> list[tuple[Int[np.ndarray, " _"], int]]:
     """Boundary curves, either those on the box or those on a cap, where a constraint cuts the set.
 
-    Parameters
-    ----------
-    eset
-        Equilibrium set over two free parameters.
-    box
-        True for the pieces on the box, False for the rest of the boundary.
-
-    Returns
-    -------
     Vertices of each piece in order, and the index of the adjacent cells.
     """
     found = []
@@ -72,8 +61,6 @@ def boundary_pieces(eset: EquilibriumSet, *, box: bool) -> list[tuple[Int[np.nda
 def limit_pieces(division: Division) -> list[tuple[Int[np.ndarray, " _"], int]]:
     """Bound along which a set was divided, cut where the index of its sides changes.
 
-    Returns
-    -------
     Vertices of each piece in order, and the lower index of its two sides.
     """
     facets = adjacency(division.eset.cells).facets
@@ -135,13 +122,7 @@ def snap_steps(route: Route) -> Int[np.ndarray, " snaps"]:
 
 
 def path_of(path_or_route: Path | Route) -> Path:
-    """Path of a route, or the path itself.
-
-    Raises
-    ------
-    InputError
-        If the route has none; its reason is named.
-    """
+    """Path of a route, or the path itself; a route without one is refused with its reason."""
     if isinstance(path_or_route, Path):
         return path_or_route
     if path_or_route.path is None:
@@ -150,17 +131,10 @@ def path_of(path_or_route: Path | Route) -> Path:
 
 
 def states_along(path: Path, count: int) -> States:
-    """Equilibria at even distances along a path.
+    """Equilibria at even distances along a path, its first and last state among them.
 
     Interpolated between its states and corrected by Newton's method at fixed parameters; where that
     leaves the interval (next to a fold), the nearest state of the path is taken.
-
-    Parameters
-    ----------
-    path
-        A lifted curve.
-    count
-        How many; the first and the last state of the path are among them.
     """
     structure, known = path.states.structure, path.states
     length = np.linspace(path.length[0], path.length[-1], count)

@@ -80,14 +80,9 @@ class DepthBuffer:
     depth: Float[np.ndarray, "rows columns"]
 
     def shows(self, places: Float[np.ndarray, "points 3"], slack: float) -> Bool[np.ndarray, " _"]:
-        """Whether points can be seen.
+        """Whether points can be seen; those on the surface may lie `slack` behind it.
 
-        Parameters
-        ----------
-        places
-            Column, row and depth of the points, as the corners of the triangles are given.
-        slack
-            How far behind the surface a point may lie that belongs to it.
+        Points have column, row and depth, as the corners of the triangles do.
         """
         rows, columns = self.depth.shape
         column, row = np.floor(places[:, :2]).astype(int).T
@@ -103,16 +98,10 @@ class DepthBuffer:
 def depth_buffer(corners: Corners, rows: int, columns: int) -> DepthBuffer:
     """Depth buffer of triangles seen along the third axis.
 
-    A triangle covers the pixels whose middles it contains; of two that share an edge exactly one
-    covers each pixel there. Depth is linear on each triangle, as it is in a parallel projection,
-    and compared in steps of 2⁻³¹ of its range.
-
-    Parameters
-    ----------
-    corners
-        Columns and rows of the corners in pixels, and their distances from the viewer.
-    rows, columns
-        Size of the picture; everything outside is clipped.
+    Corners are columns and rows in pixels and distances from the viewer; what lies outside the
+    picture is clipped. A triangle covers the pixels whose middles it contains; of two that share an
+    edge exactly one covers each pixel there. Depth is linear on each triangle, as it is in a
+    parallel projection, and compared in steps of 2⁻³¹ of its range.
     """
     low, high = (f(corners[..., 2], initial=0.0) for f in (np.min, np.max))
     step = max(high - low, np.finfo(float).tiny) / _LEVELS

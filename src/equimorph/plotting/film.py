@@ -69,16 +69,9 @@ def suffixes() -> tuple[str, ...]:
 
 
 def write_film(pictures: Sequence[Image.Image], file: FilePath, fps: int) -> None:
-    """Write pictures as a film; the first and the last one stay longer.
+    """Write pictures of one size as a film; the first and the last one stay longer.
 
-    Parameters
-    ----------
-    pictures
-        All of one size.
-    file
-        What `film_file` returned.
-    fps
-        Pictures per second, at most 50.
+    The file is what `film_file` returned; there are at most 50 pictures per second.
     """
     each = max(2, round(100 / fps)) * HUNDREDTHS
     shown = [int(1000 * PAUSE_FIRST), *[each] * (len(pictures) - 2), int(1000 * PAUSE_LAST)]
@@ -92,13 +85,7 @@ def write_film(pictures: Sequence[Image.Image], file: FilePath, fps: int) -> Non
 
 
 def convert(gif: FilePath, mp4: FilePath) -> None:
-    """Write a GIF as an MP4 by ffmpeg.
-
-    Raises
-    ------
-    OSError
-        If ffmpeg cannot, with its last line.
-    """
+    """Write a GIF as an MP4 by ffmpeg; its last line is the error if it cannot."""
     command = ["ffmpeg", "-y", "-loglevel", "error", "-i", str(gif), "-vf", EVEN]
     command += ["-pix_fmt", "yuv420p", "-movflags", "+faststart", str(mp4)]
     ran = subprocess.run(command, capture_output=True, text=True, check=False)

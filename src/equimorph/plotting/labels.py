@@ -149,9 +149,7 @@ _LEADER: dict[str, Any] = {
 def number_way_points(ax: Axes, corners: Places) -> Places:
     """Mark the way-points and number them; those at one place share a badge.
 
-    Returns
-    -------
-    Places around the badges, where nothing else should be written.
+    Returns places around the badges, where nothing else should be written.
     """
     for place, _ in _badges(corners, _to_points(ax).transform(corners)):
         ax.plot(*place, "o", **_DOT, zorder=7)
@@ -161,11 +159,8 @@ def number_way_points(ax: Axes, corners: Places) -> Places:
 def number_points(ax: Axes, places: Places) -> Places:
     """Number places; those that are the same share a badge.
 
-    A badge stands where it hides no curve already drawn, with a thin line to its point.
-
-    Returns
-    -------
-    Places around the badges, where nothing else should be written.
+    A badge stands where it hides no curve already drawn, with a thin line to its point. Returns
+    places around the badges, where nothing else should be written.
     """
     to_points = _to_points(ax)
     lines = [to_points.transform(np.asarray(line.get_xydata())) for line in ax.lines]

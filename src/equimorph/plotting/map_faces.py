@@ -33,16 +33,9 @@ class Faces:
 def faces(
     axes: tuple[Axis, Axis], value: Float[np.ndarray, "rows columns"], cuts: np.ndarray
 ) -> Faces:
-    """Faces of a map.
+    """Faces of a map over grid lines; values are not numbers where it is not defined.
 
-    Parameters
-    ----------
-    axes
-        Grid lines.
-    value
-        Values at the vertices; not numbers where the map is not defined.
-    cuts
-        Places on grid lines where the map jumps or ends.
+    `cuts` are the places on grid lines where the map jumps or ends.
     """
     defined = np.isfinite(value)
     crossings = _crossings(axes, cuts)

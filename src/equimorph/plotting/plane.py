@@ -156,20 +156,8 @@ def frame_plane(ax: Axes, eset: EquilibriumSet) -> None:
 def draw_folds(ax: Axes, eset: EquilibriumSet, *, stable_only: bool = False) -> list[Line2D]:
     """Draw the stability boundary, the other folds, branch points and the caps.
 
-    Branch points are drawn boldly where stability ends there.
-
-    Parameters
-    ----------
-    ax
-        Where to draw.
-    eset
-        Equilibrium set over two free parameters.
-    stable_only
-        Leave out what bounds no stable equilibria.
-
-    Returns
-    -------
-    One labelled line of every kind drawn, for a legend.
+    Branch points are drawn boldly where stability ends there. Returns a labelled line of every kind
+    drawn, for a legend.
     """
     cap = constraint_label(eset.constraints)
     branches = "branch points"
@@ -210,9 +198,7 @@ def _draw_limit(
 def draw_track(ax: Axes, eset: EquilibriumSet, route: Route, path: Path) -> Line2D:
     """Draw the way of a route over the plane; one that did not arrive ends in a cross.
 
-    Returns
-    -------
-    The labelled line, for a legend.
+    Returns the labelled line, for a legend.
     """
     places = track(eset, path.states)
     (line,) = ax.plot(*places.T, **_ROUTE, label="route")

@@ -57,18 +57,9 @@ def corner_normals(
 
     Crossing a fold changes the index by one and turns the projection over, so the normal whose
     vertical component has the sign (−1)^index is continuous across folds: no search for a coherent
-    orientation is needed. Weighted by the angles of the cells, as their shapes should not matter.
-
-    Parameters
-    ----------
-    corners
-        Corners of the cells, in the proportions that are drawn.
-    cells
-        Vertex numbers of the corners.
-    index
-        Index of the cells.
-    sharp
-        Vertices at which every cell keeps its own normal, because several sheets meet there.
+    orientation is needed. Weighted by the angles of the cells, in the proportions that are drawn,
+    as their shapes should not matter. At sharp vertices, where several sheets meet, every cell
+    keeps its own normal.
     """
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     upward = np.where(index % 2 == 0, 1.0, -1.0)
@@ -91,18 +82,8 @@ def paint(
     """Red, green, blue and cover of every pixel.
 
     Normals and coordinates are interpolated on each triangle, so shading is smooth, and lines on
-    the surface are as fine on large triangles as on small ones.
-
-    Parameters
-    ----------
-    buffer
-        What is seen where.
-    view
-        The view that the buffer was made for.
-    corners
-        Corners of the triangles in the coordinates of the axes.
-    surface
-        How they are painted.
+    the surface are as fine on large triangles as on small ones. The corners are in the coordinates
+    of the axes, the buffer is that of the view.
     """
     places = view.place(corners)
     normals = _unit(surface.normals @ (view.linear / surface.proportions[:, None])) * [1, 1, -1]

@@ -41,18 +41,8 @@ def prepare_axes(
 ) -> tuple[Axes, Surroundings]:
     """Axes with the surroundings of states and limits around all their outlines.
 
-    Parameters
-    ----------
-    states
-        At least one.
-    ax
-        Where to draw; None makes a figure one column wide.
-    room
-        Empty border, as a share of the width of the outlines.
-    below
-        Inches of a new figure that stay free for what comes below the axes.
-    obstacles
-        Half-planes and discs to draw.
+    `room` is the empty border, as a share of the width of the outlines; `below` the inches of a new
+    figure that stay free for what comes below the axes.
     """
     around = Surroundings(states, tuple(obstacles))
     if ax is None:

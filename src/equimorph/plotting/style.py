@@ -55,12 +55,7 @@ LIMIT_LINE: dict[str, Any] = {"color": INK, "linewidth": 1.2, "linestyle": (0, (
 def rim(width: float, colour: Any = "white") -> list[AbstractPathEffect]:
     """Return the effect that sets off a line or letters from what lies below, by default in white.
 
-    Parameters
-    ----------
-    width
-        Of the line with its rim, in typographic points.
-    colour
-        Of the rim.
+    `width` is that of the line with its rim, in typographic points.
     """
     return [withStroke(linewidth=width, foreground=colour)]
 
@@ -140,21 +135,10 @@ def _show_axes(figure: Any) -> None:
 
 
 def new_axes(width: float, height: float, room: tuple[float, float, float, float]) -> Axes:
-    """One empty axes on a new figure.
+    """One empty axes on a new figure; sizes, and the room around the frame, are in inches.
 
-    Room for labels is given, not searched for: every figure of a kind has its frame in the same
-    place, and drawing takes half the time.
-
-    Parameters
-    ----------
-    width, height
-        Size of the figure in inches.
-    room
-        Inches left free at the left, bottom, right and top of the frame.
-
-    Returns
-    -------
-    The axes; its figure is ``axes.figure``.
+    Room for labels is given (left, bottom, right, top), not searched for: every figure of a kind
+    has its frame in the same place, and drawing takes half the time.
     """
     figure = Picture(width, height)
     left, bottom, right, top = room
@@ -177,16 +161,8 @@ def grow_below(ax: Axes, inches: float) -> None:
 def legend_below(ax: Axes, entries: Sequence[Artist], *, room: bool, columns: int = 2) -> None:
     """Legend below the labels of a frame, after the entries that are there.
 
-    Parameters
-    ----------
-    ax
-        The frame.
-    entries
-        What to add; nothing happens without any.
-    room
-        Whether the figure grows by the height of the legend.
-    columns
-        How many entries stand side by side.
+    `room`: whether the figure grows by the height of the legend; `columns`: how many entries stand
+    side by side.
     """
     legend = ax.get_legend()
     known = [] if legend is None else [each for each in legend.legend_handles if each is not None]

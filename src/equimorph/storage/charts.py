@@ -70,14 +70,7 @@ def load_chart(path: str | Path) -> Chart | Atlas:
 
 
 def write_chart(group: h5py.Group, chart: Chart | Atlas) -> None:
-    """Write a chart or an atlas with its set.
-
-    Parameters
-    ----------
-    group
-        An empty group.
-    chart
-        A projection, descriptor chart, reduction by a rule that has a name, or atlas.
+    """Write a chart or an atlas with its set into an empty group.
 
     Raises
     ------

@@ -89,13 +89,7 @@ def write_csv(path: Path, rows: Iterable[Iterable[object]]) -> Path:
 
 
 def read_text(path: Path) -> str:
-    """Read a text file.
-
-    Raises
-    ------
-    InputError
-        If it cannot be read as UTF-8 text.
-    """
+    """Read a UTF-8 text file; one that cannot be read is refused."""
     try:
         return path.read_text(encoding="utf-8")
     except UnicodeDecodeError as error:

@@ -45,20 +45,10 @@ def put(
     meaning: str = "",
     unit: str = "",
 ) -> h5py.Dataset:
-    """Store an array with the names of its dimensions.
+    """Store an array with the names of its dimensions, its meaning and its unit.
 
-    Parameters
-    ----------
-    group
-        Where it goes.
-    name
-        Of the array.
-    values
-        Numbers or texts.
-    dimensions
-        One name per axis; made in `group` unless it or a group above has it.
-    meaning, unit
-        What it is, and its unit, for people and for what reads the attribute ``units``.
+    Dimensions, one name for each axis, are made in `group` unless it or a group above has them.
+    People read the meaning, programs the attribute ``units``.
     """
     array = np.asarray(values)
     plain = array.size == 0 or array.dtype.kind in "OU"
@@ -99,40 +89,16 @@ def content(kind: str, version: int, fill: Callable[[h5py.File], None]) -> bytes
 
 
 def write(path: Path, kind: str, version: int, fill: Callable[[h5py.File], None]) -> Path:
-    """Write a new HDF5 file of ours in one step.
+    """Write a new HDF5 file of ours, of a kind and version, in one step.
 
     It is made in memory: on a full disk the HDF5 library fails late and leaves a wreck open, while
     bytes are written or not.
-
-    Parameters
-    ----------
-    path
-        Name of the file.
-    kind, version
-        What `open_file` checks.
-    fill
-        Puts the groups into the file.
     """
     return _write_with_checksum(path, _image(kind, version, fill))
 
 
 def extend(path: Path, kind: str, version: int, fill: Callable[[h5py.File], None]) -> Path:
-    """Put more into a file of ours, in one step.
-
-    Parameters
-    ----------
-    path
-        Name of the file.
-    kind, version
-        What `open_file` checks.
-    fill
-        Puts more groups into the file.
-
-    Raises
-    ------
-    InputError
-        As for `open_file`.
-    """
+    """Put more into a file of ours, in one step; refused as by `open_file`."""
     memory = io.BytesIO()
     with open_file(path, kind, version):
         memory.write(_strip_checksum(path.read_bytes()))
@@ -251,18 +217,9 @@ def put_parameters(
     arrays: Mapping[str, Shaped[np.ndarray, "..."]],
     dimension: str,
 ) -> None:
-    """Store arrays with a column for each parameter, which names and units label.
+    """Store arrays, by name, with a column for each parameter, which names and units label.
 
-    Parameters
-    ----------
-    group
-        Where they go.
-    units
-        By parameter, in the order of the columns.
-    arrays
-        By name.
-    dimension
-        Name of the rows.
+    The rows are those of a dimension.
     """
     if PARAMETER not in group:
         put_coordinate(group, PARAMETER, np.array([*units], object), "name of the parameter")

@@ -25,13 +25,7 @@ class Owner:
     descriptors: Mapping[str, Descriptor] = field(default_factory=dict)
 
     def descriptor(self, name: str) -> Descriptor:
-        """Descriptor of a name.
-
-        Raises
-        ------
-        InputError
-            If neither the structure nor the user gives a descriptor of this name.
-        """
+        """Descriptor of a name that the structure or the user gives; other names are refused."""
         return worst_named(self.structure, name, self.descriptors)
 
     def constraint(self, words: list[Any]) -> Constraint:

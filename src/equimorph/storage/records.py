@@ -108,16 +108,9 @@ def label(group: h5py.Group, schema: str) -> None:
 
 
 def read_record(group: h5py.Group, owner: Owner, schema: str = RECORD) -> Any:
-    """Read what `write_record` wrote.
+    """Read what `write_record` wrote for an owner.
 
-    Parameters
-    ----------
-    group
-        Where it is.
-    owner
-        To which it belongs.
-    schema
-        Of groups that name none, as the first releases wrote them.
+    `schema` is that of groups that name none, as the first releases wrote them.
 
     Raises
     ------

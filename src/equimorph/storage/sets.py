@@ -36,17 +36,10 @@ VTK_TYPES = {2: 3, 3: 5, 4: 10}
 
 
 def write_set(group: h5py.Group, eset: EquilibriumSet, height: Descriptor | None = None) -> None:
-    """Write a set.
+    """Write a set into an empty group.
 
-    Parameters
-    ----------
-    group
-        An empty group.
-    eset
-        The set.
-    height
-        Coordinate of the embedding after the free parameters; by default the descriptor that
-        distinguishes states.
+    `height` is the coordinate of the embedding after the free parameters; by default the descriptor
+    that distinguishes states.
     """
     height = height or eset.structure.elevation
     points = eset.points
@@ -215,16 +208,9 @@ def _chains(group: h5py.Group, name: str, d: int) -> list[Int[np.ndarray, "..."]
 
 
 def link_grid(file: h5py.File, group: h5py.Group, size: int) -> None:
-    """Add ``/VTKHDF`` to a file whose `group` holds an equilibrium set.
+    """Add ``/VTKHDF`` to a file whose `group` holds a set of cells with `size` corners.
 
-    Parameters
-    ----------
-    file
-        Where the grid goes.
-    group
-        With ``embedding``, ``connectivity`` and arrays along the file's dimensions vertex and cell.
-    size
-        Corners of a cell.
+    The group has ``embedding``, ``connectivity`` and arrays along the dimensions vertex and cell.
     """
     grid = file.create_group("VTKHDF")
     grid.attrs["Version"] = np.array([1, 0])  # as later ones for one grid; older readers warn

@@ -171,16 +171,8 @@ def vtp_file(
 ) -> bytes:
     """XML of VTK with its numbers in base64.
 
-    Parameters
-    ----------
-    points
-        Places.
-    group
-        "Lines" or "Polys".
-    corners, ends
-        Corners of all cells one after the other, and where each cell ends.
-    on_points, on_cells
-        Numbers or vectors by name.
+    `group` is "Lines" or "Polys"; corners are those of all cells one after the other, `ends` where
+    each cell ends. Numbers or vectors on points and cells have names.
     """
     number = dict.fromkeys(("Verts", "Lines", "Strips", "Polys"), 0)
     number[group] = len(ends)

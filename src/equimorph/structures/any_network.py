@@ -114,13 +114,7 @@ class AnyNetwork(DiscreteStructure):
     """Length by which displacements are measured."""
 
     def axis(self, given: str) -> int:
-        """Number of a coordinate axis.
-
-        Raises
-        ------
-        InputError
-            For another word.
-        """
+        """Number of a coordinate axis; other words are refused."""
         axes = tuple("xyz"[: self.network.space])
         if given not in axes:
             raise InputError(f"`axis` must be one of {', '.join(axes)}; got {given!r}.")
@@ -190,9 +184,8 @@ NAMES: dict[tuple[int, ...], str] = {
 def images(places: Float[np.ndarray, "joints space"]) -> Iterator[tuple[str, Signs, Joints]]:
     """Reflections and half turns about the middle that take joints to joints.
 
-    Yields
-    ------
-    Name, signs of the axes, and the joint in the place of whose image each joint comes to be.
+    Yields names, signs of the axes, and the joint in the place of whose image each joint comes to
+    be.
     """
     middle = 0.5 * (places.min(axis=0) + places.max(axis=0))
     near = SAME_NUMBER * np.ptp(places, axis=0).max()

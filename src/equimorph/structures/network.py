@@ -98,11 +98,8 @@ class Network(ABC):
     def check(self) -> None:
         """Refuse what is no network in one piece.
 
-        Raises
-        ------
-        InputError
-            For no edges, two between the same joints, one without length, joints without edges, or
-            joints that are not connected to the rest.
+        It has edges, no two between the same joints, none without length, none of its joints
+        without edges, and all of them are connected.
         """
         if not self.edge_names:
             raise InputError(f"`{self.edge}s` must be one at least; got none.")
@@ -219,13 +216,7 @@ class Edge:
 
 
 def check_hinges(member: Edge, hinges: Collection[str], which: str) -> None:
-    """Refuse hinges that are not at different joints of a member.
-
-    Raises
-    ------
-    InputError
-        With the member.
-    """
+    """Refuse hinges that are not at different joints of a member."""
     strange = [end for end in hinges if end not in member.corners]
     if strange or len(set(hinges)) < len(hinges):
         raise InputError(
@@ -236,10 +227,7 @@ def check_hinges(member: Edge, hinges: Collection[str], which: str) -> None:
 def arc_length(member: Edge, curvature: float, chord: float, gyration: float) -> float:
     """Length of an arc over a chord, of a member with a radius of gyration √(EI/EA).
 
-    Raises
-    ------
-    InputError
-        If no slender arc fits.
+    Refused if no slender arc fits.
     """
     half = 0.5 * abs(curvature) * chord
     if half >= 1.0:
@@ -261,12 +249,7 @@ def edges_between(
 ) -> tuple[Ends, Int[np.ndarray, " edges"]]:
     """Numbers of the joints that edges join, one edge for each two successive joints of a member.
 
-    And the member to which each edge belongs.
-
-    Raises
-    ------
-    InputError
-        For an unknown joint.
+    And the member to which each edge belongs. Unknown joints are refused.
     """
     found, owner = [], []
     for m, each in enumerate(members):
@@ -285,13 +268,7 @@ def edges_between(
 def supported_joints(
     given: Mapping[str, Any], joints: Sequence[str]
 ) -> Iterable[tuple[int, str, Any]]:
-    """Number and name of each supported joint, and what is said of its support.
-
-    Raises
-    ------
-    InputError
-        For an unknown joint.
-    """
+    """Number and name of each supported joint, and what is said of its support."""
     for joint, support in given.items():
         if joint not in joints:
             raise InputError(f"`supports` must be at joints ({', '.join(joints)}); got {joint}.")
@@ -299,13 +276,7 @@ def supported_joints(
 
 
 def position_of_joint(name: Any, joints: Sequence[str]) -> int:
-    """Place of a joint in the list.
-
-    Raises
-    ------
-    InputError
-        For an unknown joint.
-    """
+    """Place of a joint in the list; an unknown one is refused."""
     if name not in joints:
         raise InputError(
             f"`joint` must be one of {', '.join(joints)}; got {name!r}."
@@ -315,13 +286,7 @@ def position_of_joint(name: Any, joints: Sequence[str]) -> int:
 
 
 def check_parameter_names(names: Sequence[str]) -> None:
-    """Refuse names of loads and actuators that are no words, or used twice.
-
-    Raises
-    ------
-    InputError
-        Without names, and for one that is no word or is used twice, which is named.
-    """
+    """Refuse names of loads and actuators that are no words, or used twice, and their absence."""
     if not names:
         raise InputError("`loads` or `actuators` must name a parameter; got none.")
     for i, name in enumerate(names):
@@ -356,13 +321,7 @@ def direction_of_mechanism(moves: Float[np.ndarray, "joints space"]) -> tuple[in
 
 
 def vector(given: Sequence[float], counts: Sequence[int], what: str) -> list[float]:
-    """Numbers, as many as one of `counts`.
-
-    Raises
-    ------
-    InputError
-        For more or fewer.
-    """
+    """Numbers, as many as one of `counts`; more or fewer are refused."""
     if len(given) not in counts:
         many = " or ".join(map(str, counts))
         raise InputError(f"`{what}` must be {many} finite numbers; got {given!r}.")

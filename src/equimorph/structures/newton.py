@@ -138,16 +138,9 @@ class Newton:
 def newton(
     equations: Steps, z: Lanes, p: Parameters, limits: Limits, through: Through | None = None
 ) -> Newton:
-    """Correct guesses to points with F(z; p) = 0.
+    """Correct guesses to points with F(z; p) = 0, in planes through them or at fixed parameters.
 
-    Parameters
-    ----------
-    equations, z, p
-        What is solved, and guesses.
-    limits
-        How long steps may be, and when a lane ends.
-    through
-        Planes through the guesses; without them the parameters are fixed.
+    The limits say how long steps may be, and when a lane ends.
     """
     (lanes, size), k = z.shape, 0 if through is None else 1
     # structures compute whole blocks of lanes: the rest of one goes with the first lane

@@ -58,14 +58,9 @@ class Profile:
 
 
 def profile(radius: float, flatness: float) -> Profile:
-    """A circle with a stripe, or a rectangle with a pale back.
+    """A circle of a radius with a stripe, or a rectangle with a pale back.
 
-    Parameters
-    ----------
-    radius
-        Of the circle.
-    flatness
-        Width along the binormal over thickness along the normal.
+    `flatness` is the width along the binormal over the thickness along the normal.
     """
     if 1.0 / _ROUND < flatness < _ROUND:
         angles = 2.0 * np.pi * (np.arange(_SIDES + 1) - 0.5 * _STRIPE) / _SIDES
@@ -135,15 +130,7 @@ def _frame_along(tangent: Float[np.ndarray, " 3"]) -> Float[np.ndarray, "3 3"]:
 
 
 def solids(states: States, size: float) -> list[Mesh]:
-    """One mesh for each state.
-
-    Parameters
-    ----------
-    states
-        Of a structure in space.
-    size
-        That of the structure, which the thickness follows.
-    """
+    """One mesh for each state in space; their thickness follows the size of the structure."""
     structure, shapes = states.structure, states.shape()
     frames = structure.frames(states.z, states.p)
     if frames is None:

@@ -161,15 +161,8 @@ class UnitSystem:
     def check_all_have_units(self, given: Mapping[str, Any]) -> None:
         """Refuse plain numbers together with texts with units where no units are named for them.
 
-        Parameters
-        ----------
-        given
-            Quantities by name; None where none is given.
-
-        Raises
-        ------
-        InputError
-            For the first number other than zero without a unit.
+        The first number other than zero without a unit is named; None where a quantity is not
+        given.
         """
         texts = [name for name, each in given.items() if isinstance(each, str)]
         plain = [name for name, each in given.items() if is_number(each) and each != 0]
@@ -221,13 +214,7 @@ def kilograms(given: Any, what: str) -> float:
 
 
 def unit_system(given: Units | None) -> UnitSystem:
-    """System of units from a table, or none.
-
-    Raises
-    ------
-    InputError
-        For one unit without the other, or unknown units.
-    """
+    """System of units from a table, or none; half a system and unknown units are refused."""
     if given is None:
         return UnitSystem()
     if len(given) < 2:

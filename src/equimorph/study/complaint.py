@@ -78,16 +78,9 @@ _REQUIREMENTS = {
 
 
 def complaint(error: ValidationError, model: type[BaseModel], file: str) -> StudyError:
-    """Describe each error of a study file in one line.
+    """Describe each error that pydantic found in a study file in one line, after the file's name.
 
-    Parameters
-    ----------
-    error
-        What pydantic found.
-    model
-        The model of the whole file, which knows the allowed keys.
-    file
-        Name of the file, to begin the lines with.
+    The model is that of the whole file, which knows the allowed keys.
     """
     findings = error.errors(include_url=False)
     # A misspelt key is also a missing one: name the misspelling first.

@@ -27,15 +27,7 @@ _LARGER = {".png": ".svg", ".gif": ".mp4"}
 
 
 def page(title: str, body: Sequence[str]) -> str:
-    """Return a whole page with the style sheet inside.
-
-    Parameters
-    ----------
-    title
-        Plain text.
-    body
-        Pieces of HTML.
-    """
+    """Return a whole page with the style sheet inside: a plain title, and pieces of HTML."""
     style = files("equimorph.study").joinpath("report.css").read_text(encoding="utf-8")
     return (
         '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
@@ -47,18 +39,10 @@ def page(title: str, body: Sequence[str]) -> str:
 
 
 def figure(file: Path, caption: str, *, larger: str = "", wide: bool = False) -> str:
-    """Return a picture with its caption; the picture itself goes into the page.
+    """Return a picture, PNG or GIF, with its caption; the picture itself goes into the page.
 
-    Parameters
-    ----------
-    file
-        A PNG or GIF.
-    caption
-        Plain text, also what is read aloud.
-    larger
-        File in the folder of the page that the picture links to.
-    wide
-        Whether it takes a whole row.
+    The caption is plain text, and also read aloud. `larger` is a file in the folder of the page
+    that the picture links to; a wide one takes a whole row.
     """
     data = base64.b64encode(file.read_bytes()).decode("ascii")
     words = escape(caption)
@@ -138,16 +122,9 @@ def extent(box: Box, fixed: Mapping[str, float], constraints: Sequence[Constrain
 def table(
     head: Sequence[str], rows: Sequence[Sequence[str]], classes: Sequence[str] | str = ""
 ) -> str:
-    """Return a table of ready pieces of HTML.
+    """Return a table of ready pieces of HTML, with a head unless that is empty.
 
-    Parameters
-    ----------
-    head
-        Column titles; none for a table without a head.
-    rows
-        Cells, row by row.
-    classes
-        Class of the table, or one for each row.
+    `classes` is the class of the table, or one for each row.
     """
     whole = classes if isinstance(classes, str) else ""
     each = [""] * len(rows) if isinstance(classes, str) else classes
@@ -165,14 +142,9 @@ def table(
 
 
 def sketch(shape: Float[np.ndarray, "points 2"], box: Float[np.ndarray, "2 2"]) -> str:
-    """Return a small drawing of a shape.
+    """Return a small drawing of a shape, whose y points upward.
 
-    Parameters
-    ----------
-    shape
-        Coordinates, y upward.
-    box
-        Lower and upper corner of what is drawn, so that several sketches share their scale.
+    The corners of the box are those of what is drawn, so that several sketches share their scale.
     """
     (left, low), (right, high) = box
     points = " ".join(f"{x:.4f},{-y:.4f}" for x, y in shape)
@@ -199,18 +171,10 @@ def table_of_states(
     *,
     numbered: bool = False,
 ) -> str:
-    """Return a table with one row per state.
+    """Return a table with one row per state, and a column for each descriptor.
 
-    Parameters
-    ----------
-    states
-        At least one.
-    descriptors
-        Columns.
-    more
-        Further columns, ready texts by their titles.
-    numbered
-        Whether rows are numbered from 1, as on the accompanying figure.
+    `more` are further columns, ready texts by their titles; numbers from 1 are those of the
+    accompanying figure.
     """
     shapes = flat_shapes(states.structure, states.shape())
     box = np.stack([shapes.min(axis=(0, 1)) - ROOM, shapes.max(axis=(0, 1)) + ROOM])

@@ -92,18 +92,9 @@ def at_key(key: str) -> Generator[None]:
 
 
 def check_point(box: Box, point: Mapping[str, float], key: str, *, whole: bool = True) -> None:
-    """Refuse a point that names other parameters than the box, or lies outside it.
+    """Refuse a point that names other parameters than the study's box, or lies outside it.
 
-    Parameters
-    ----------
-    box
-        The box of the study.
-    point
-        Values by name.
-    key
-        Key of the study file, for the message.
-    whole
-        Whether all parameters of the box must be named.
+    `whole`: whether all parameters of the box must be named; `key` is that of the study file.
     """
     names = ", ".join(box.names)
     if not set(point) <= set(box.names) or (whole and len(point) < len(box.names)):
@@ -187,13 +178,7 @@ class RuleSection(Section):
 
 
 def rule_of(ground: Ground, section: RuleSection, key: str) -> charts.Rule:
-    """Rule that a section describes.
-
-    Raises
-    ------
-    InputError
-        For a descriptor or parameter that the structure does not have.
-    """
+    """Rule that a section describes."""
     if section.highest is not None:
         return charts.highest(descriptor_at(ground, section.highest, f"{key}.highest"))
     if section.lowest is not None:

@@ -27,18 +27,11 @@ _GROUP_FILES = (
 
 
 def estimated_memory(size: int, intervals: tuple[int, ...]) -> float:
-    """Peak of the resident memory of a run in bytes.
+    """Peak of the resident memory of a run in bytes, by unknowns and multipliers and the grid.
 
     For sets with one or two equilibria over most points, like those of the arch and the spring (in
-    three parameters, up to seven):
-    there the measured peak lies between half of the estimate and all of it.
-
-    Parameters
-    ----------
-    size
-        Unknowns and multipliers of a state.
-    intervals
-        Of the grid.
+    three parameters, up to seven): there the measured peak lies between half of the estimate and
+    all of it.
     """
     vertices = math.prod(count + 1 for count in intervals)
     return PROGRAM + vertices * (PER_VERTEX[len(intervals)] + PER_UNKNOWN * size)

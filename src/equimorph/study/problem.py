@@ -156,20 +156,10 @@ class SoundPart:
 
 
 def sound_part(text: str, error: ValidationError, folder: Path | None = None) -> SoundPart | None:
-    """Return what remains of a study without the tables in which mistakes were found.
+    """Return what remains of a study, TOML, without the tables in which pydantic found mistakes.
 
-    Parameters
-    ----------
-    text
-        Content of the file, which is TOML.
-    error
-        What pydantic found.
-    folder
-        Where files lie that the study names.
-
-    Returns
-    -------
-    None if the structure is wrong, or what remains is no study.
+    None if the structure is wrong, or what remains is no study. Files that it names lie in a
+    folder.
     """
     broken = {_table_of(finding["loc"]) for finding in error.errors(include_url=False)}
     kept: dict[str, Any] = {}
@@ -197,19 +187,12 @@ def _validate(content: Mapping[str, Any], folder: Path | None) -> Study:
 
 
 def parse_toml(text: str, name: str) -> dict[str, Any]:
-    """Read TOML.
-
-    Parameters
-    ----------
-    text
-        Content of a file.
-    name
-        Name of the file, for messages.
+    """Read TOML of a named file.
 
     Raises
     ------
     InputError
-        If `text` is malformed: with the line and what stands there.
+        If the text is malformed: with the line and what stands there.
     """
     try:
         return tomllib.loads(text)

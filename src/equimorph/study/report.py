@@ -43,17 +43,7 @@ ON_THE_SET = "The equilibrium set, to turn and to walk on"
 
 
 def draw_figures(outcome: Outcome, folder: ResultsFolder, progress: Progress) -> None:
-    """Draw all figures of an outcome that the folder does not hold yet.
-
-    Parameters
-    ----------
-    outcome
-        What was found.
-    folder
-        Where the files go, figure by figure.
-    progress
-        Receives the progress of the drawing.
-    """
+    """Draw all figures of an outcome that the folder does not hold yet."""
     figures = _figures(outcome)
     for done, figure in enumerate(figures):
         progress.report("figures", done, len(figures))
@@ -124,19 +114,7 @@ def _figures_of_set(outcome: Outcome, eset: EquilibriumSet) -> list[Figure]:
 
 
 def report(outcome: Outcome, folder: Path, text: str, title: str) -> str:
-    """Return the page.
-
-    Parameters
-    ----------
-    outcome
-        What was found.
-    folder
-        Folder of the figures and of the page.
-    text
-        The study file as it was written.
-    title
-        Heading.
-    """
+    """Return the page on what was found, with figures of a folder and the study as written."""
     body = [f"<h1>{escape(title)}</h1>", _question(outcome.problem)]
     if (folder / EXPLORER).exists():
         body.append(html.embed(EXPLORER, ON_THE_SET))

@@ -224,16 +224,8 @@ def solve(
 ) -> Outcome:
     """Answer everything that a study asks for.
 
-    Parameters
-    ----------
-    study, problem
-        The questions, as written and as objects.
-    folder
-        Where answers are kept, and where earlier ones may be.
-    progress
-        Receives the progress of the run.
-    workers
-        Who lifts the tiles of the set, and computes the rays of maps and the trials.
+    Answers are kept in the folder, where earlier ones may be. Workers lift the tiles of the set,
+    and compute the rays of maps and the trials.
     """
     seconds: dict[str, float] = {}
     checkpoints = Checkpoints(folder, problem.structure)

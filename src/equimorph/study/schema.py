@@ -129,12 +129,7 @@ def _meanings_of_keys() -> dict[type[Section], Mapping[str, str]]:
 def _tidy(node: Any, *, named: bool = False) -> Any:
     """Return a schema without the titles of pydantic, and without null, which TOML has not.
 
-    Parameters
-    ----------
-    node
-        Part of the schema.
-    named
-        Whether the keys of the part are names of the study, not words of the schema.
+    `named`: whether the keys of this part are names of the study, not words of the schema.
     """
     if isinstance(node, list):
         return [_tidy(each) for each in node]

@@ -55,13 +55,7 @@ class PointSection(Section):
 
 
 def extent_of_set(structure: Structure, wanted: Any) -> Extent:
-    """Look up the names of the section on the set.
-
-    Raises
-    ------
-    InputError
-        For names that the structure does not have, or values without meaning.
-    """
+    """Look up the names of the section on the set."""
     findings, constraints = Findings(), tuple[Constraint, ...]()
     with at_key("set.box"):
         box = Box(**{name: (bounds[0], bounds[1]) for name, bounds in wanted.box.items()})

@@ -175,18 +175,10 @@ def arguments_of(
     *,
     natural: bool = False,
 ) -> list[Argument]:
-    """Return the arguments of a task that a study gives.
+    """Return the arguments of a task, a function or a class of results, that a study gives.
 
-    Parameters
-    ----------
-    task
-        A function, or a class of results.
-    names
-        Keys of arguments that are called otherwise in studies.
-    left_out
-        Arguments that no key gives.
-    natural
-        Whether states come from natural ones instead of the set.
+    `names` are keys of arguments that are called otherwise in studies; no key gives those left out.
+    `natural`: whether states come from natural ones instead of the set.
 
     Raises
     ------

@@ -66,15 +66,6 @@ def check_natural(ground: Ground, given: NaturalSection, key: str) -> None:
 def choose_state(ground: Ground, section: StateSection, key: str) -> State:
     """Return the stable equilibrium that a section of a study describes.
 
-    Parameters
-    ----------
-    ground
-        The equilibrium set, and what the descriptors mean by which it is chosen.
-    section
-        Point, and how to choose among the stable equilibria over it.
-    key
-        Key of the study file, for messages.
-
     Raises
     ------
     InputError

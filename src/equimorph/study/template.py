@@ -18,13 +18,7 @@ _SCHEMA_LINE = re.compile(r"^#:schema .*$", re.MULTILINE)
 
 
 def template(kind: str) -> str:
-    """Return the text of an example study.
-
-    Raises
-    ------
-    InputError
-        If there is no template of this kind.
-    """
+    """Return the text of an example study; kinds without a template are refused."""
     if kind not in KINDS:
         raise InputError(f"`kind` must be one of {', '.join(KINDS)}; got {kind!r}.")
     return _template_file(f"{kind}.toml").read_text(encoding="utf-8")

@@ -84,18 +84,7 @@ def inadmissible(
 ) -> str:
     """Why a motion must not begin or end in a state, in words; empty if it may.
 
-    Parameters
-    ----------
-    name
-        What the state is called: "start", "goal".
-    state
-        The state.
-    within
-        Constraints to obey.
-    margin
-        Smallest stability margin allowed.
-    slack
-        Excess over a bound that counts as none.
+    `name` is "start" or "goal"; `slack` is an excess over a bound that counts as none.
     """
     for constraint in within:
         if not constraint.excess(state.z[None], state.p[None])[0] <= slack:

@@ -155,22 +155,11 @@ def roots(
     known: Float[np.ndarray, "n 2"],
     value_of: Callable[[Vertices, Some], Float[np.ndarray, " some"]],
 ) -> tuple[ItemFlags, Vertices]:
-    """Vertices where a function vanishes or jumps through zero on edges.
+    """Edges on which a function vanishes or jumps through zero, and the vertices there.
 
-    By regula falsi (Illinois), and by halves where that is slow.
-
-    Parameters
-    ----------
-    mark, index
-        The mark of the edges, and the index of each.
-    known
-        Values at both ends, of different signs.
-    value_of
-        Values at vertices on the edges whose numbers are the second argument.
-
-    Returns
-    -------
-    Edges on which a root was found, and the roots in the order of these edges.
+    By regula falsi (Illinois), and by halves where that is slow. `known` are the values at both
+    ends, of different signs; `value_of` gives those at vertices on the edges that its second
+    argument names. The edges have one mark, and each has an index.
     """
     low, high = np.zeros(len(ends)), np.ones(len(ends))
     at_low, at_high = known.T.copy()

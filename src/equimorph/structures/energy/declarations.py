@@ -282,10 +282,7 @@ def _check_names(names: Sequence[str]) -> None:
 def mass_rows(given: Sequence[Any], unknowns: int) -> tuple[tuple[Any, ...], ...]:
     """Rows of a mass matrix from its diagonal or its rows; none where nothing is given.
 
-    Raises
-    ------
-    InputError
-        For another number of rows, or of entries in one.
+    Other numbers of rows, or of entries in one, are refused.
     """
     if not len(given):
         return ()

@@ -39,10 +39,7 @@ class Mark:
 def marks_of(given: Sequence[DrawnSupport], points: int) -> tuple[Mark, ...]:
     """Supports from tables with the keys point, kind and angle.
 
-    Raises
-    ------
-    InputError
-        For an unknown kind, or a point that is not drawn.
+    Unknown kinds, and points that are not drawn, are refused.
     """
     found: list[Mark] = []
     for i, data in enumerate(given):
@@ -65,10 +62,7 @@ def forces_of(
 ) -> tuple[tuple[int, ...], tuple[tuple[Any, Any], ...]]:
     """Points on which forces act, and their components, from tables with point and force.
 
-    Raises
-    ------
-    InputError
-        For a force that has not two components, or a point that is not drawn.
+    Forces that have not two components, and points that are not drawn, are refused.
     """
     places, vectors = [], []
     for i, data in enumerate(given):

@@ -59,10 +59,8 @@ _COMPARED: dict[type, Callable[[Any, Any], Any]] = {
 def expression(given: Any, names: Mapping[str, Any], what: str) -> Any:
     """Scalar CasADi expression of a text, a number or an expression.
 
-    Raises
-    ------
-    InputError
-        If `given` is no scalar, or text that is no formula in `names`; `what` names the argument.
+    What is no scalar, and text that is no formula in `names`, is refused; `what` names the
+    argument.
     """
     ca = casadi()
     if isinstance(given, str):

@@ -123,13 +123,7 @@ def _power(place: int, factor: int, exponent: list[Any]) -> list[list[Any]]:
 
 
 def tape(inputs: Sequence[Any], outputs: Any) -> Tape:
-    """Tape of a column of expressions in columns of symbols.
-
-    Raises
-    ------
-    InputError
-        If the expressions hold an operation that tapes do not know.
-    """
+    """Tape of a column of expressions in columns of symbols; unknown operations are refused."""
     ca = casadi()
     column = ca.densify(ca.vec(outputs))
     function = ca.Function("tape", [ca.vertcat(*inputs)], [column], {"cse": True})

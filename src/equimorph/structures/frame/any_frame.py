@@ -126,10 +126,7 @@ class AnyFrame(StressedFrame, Shortening, Refinable):
     def _refuse_singular(self) -> None:
         """Refuse mechanisms, and forces that deformations do not determine.
 
-        Raises
-        ------
-        InputError
-            With the joint or member that moves, or the members that supports stretch.
+        The joint or member that moves is named, or the members that supports stretch.
         """
         bare = self.unstressed
         p = np.zeros((1, bare.model.patterns.count))

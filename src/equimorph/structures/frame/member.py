@@ -42,13 +42,7 @@ class AnyMember(Edge, ABC):
     curvature: Quantity
 
     def check_section(self) -> None:
-        """Refuse what a section gives, too.
-
-        Raises
-        ------
-        InputError
-            With the first such field.
-        """
+        """Refuse what a section gives, too."""
         twice = [key for key in self.from_section if getattr(self, key) is not None]
         if self.section is not None and twice:
             raise InputError(

@@ -117,15 +117,8 @@ SupportSpec = (
 def stiffnesses(joint: str, given: SupportSpec, system: UnitSystem) -> Float[np.ndarray, "3"]:
     """Stiffness of a support against moves in x, in y and against turning; ∞ where it holds.
 
-    Parameters
-    ----------
-    joint
-        Name of the joint, for messages.
-    given
-        "fixed", "pinned", the axes that a roller holds ("x", "y", "xy"), or a table from axes
-        ("x", "y", "angle") to "held" or a spring's stiffness.
-    system
-        Units of the stiffnesses.
+    A support is "fixed", "pinned", the axes that a roller holds ("x", "y", "xy"), or a table from
+    axes ("x", "y", "angle") to "held" or a spring's stiffness. The joint is named in messages.
     """
     table: Mapping[str, Any] = {}
     if not isinstance(given, str):

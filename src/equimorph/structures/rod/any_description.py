@@ -80,12 +80,8 @@ class RodDescription(ABC):
     def check_reach(self, given: Mapping[str, Any], length: Any) -> None:
         """Refuse places of end B that an inextensible rod cannot reach.
 
-        Parameters
-        ----------
-        given
-            Span and rises as the user wrote them, by the names of the arguments, or None.
-        length
-            Of the rod, as the user wrote it.
+        `given` are span and rises as the user wrote them, by the names of the arguments, or None;
+        `length` is that of the rod, as the user wrote it.
         """
         places = {name: float(self.places[name]) for name in self.places if name in self.opposed}
         far = np.linalg.norm(list(places.values()))
@@ -339,15 +335,7 @@ class Construction(Generic[Built_co]):
 
 
 def construction(description: Description[Built_co], parameters: int) -> Construction[Built_co]:
-    """Take a description apart.
-
-    Parameters
-    ----------
-    description
-        The rod.
-    parameters
-        How many parameters its user has; further ones of the description are zero.
-    """
+    """Take the description of a rod apart whose user has some parameters; further ones are zero."""
     model = description.raw_model(*RESOLUTION)
     first = model.multipliers
     rows = description.matrix(model)[first:-1, first:]

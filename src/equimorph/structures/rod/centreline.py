@@ -48,21 +48,11 @@ def stations() -> Float[np.ndarray, " samples"]:
 
 
 def closest_approach(line: Centreline, apart: float) -> tuple[Values, Values]:
-    """Smallest distance between points whose arclengths differ by `apart` at least.
+    """Smallest distance between points whose arclengths differ by `apart`, and where it is.
 
-    The closest pair of samples, improved by Newton on the osculating parabolas of both points;
-    third order in the spacing of the samples.
-
-    Parameters
-    ----------
-    line
-        Centreline at `stations`.
-    apart
-        Least distance along the rod, as a share of its length.
-
-    Returns
-    -------
-    Distances, and the arclength of the first point of each pair.
+    The closest pair of samples at `stations`, improved by Newton on the osculating parabolas of
+    both points; third order in the spacing of the samples. `apart` is the least difference, as a
+    share of the length; the arclength is that of the first point of each pair.
     """
     s, places = stations(), line.places
     far = s[None, :] - s[:, None] >= apart - EQUAL_ARCLENGTHS

@@ -182,21 +182,10 @@ def mesh_with_kinks(kinks: Float[np.ndarray, " kinks"], elements: int, degree: i
 def error_by_refinement(
     start: Lanes, correction: Callable[[Lanes], Lanes], change: Callable[[Lanes], Values]
 ) -> Values:
-    """Estimate discretisation errors by solving again on a finer mesh.
+    """Estimate discretisation errors by solving again on a finer mesh: twice the largest change.
 
-    Parameters
-    ----------
-    start
-        States, interpolated to the finer mesh.
-    correction
-        Newton correction of states of the finer mesh.
-    change
-        Largest change of the results from the given states to those of the finer mesh.
-
-    Returns
-    -------
-    Twice the change. Infinite where the finer mesh has no equilibrium near the state, as may
-    happen at a fold.
+    States are interpolated to the finer mesh and corrected there. Infinite where the finer mesh has
+    no equilibrium near the state, as may happen at a fold.
     """
     last = np.full_like(start, np.inf)
     for _ in range(REFINING):

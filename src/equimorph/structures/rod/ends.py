@@ -167,13 +167,7 @@ def compliance(holding: Holding) -> float:
 
 
 def check_supports(ends: tuple[End, End]) -> None:
-    """Refuse a rod that can move as a whole.
-
-    Raises
-    ------
-    InputError
-        If neither end holds x, or y, or nothing holds the rotation.
-    """
+    """Refuse a rod that can move as a whole: nothing holds x, or y, or the rotation."""
     first, last = ends
     if first.slide is not None or last.slide is not None:
         other = last if first.slide is not None else first

@@ -21,14 +21,8 @@ def double_quadrature(
 ) -> Float[np.ndarray, "elements order elements order"]:
     """W of ``½ ∫∫ sign(s − s') cos θ(s) sin θ(s') ds' ds`` for the nodes of all elements.
 
-    Parameters
-    ----------
-    weights, lengths
-        Quadrature weights and lengths of the elements.
-    integral
-        Integrals from the start of an element of length 1 to its nodes.
-    sides
-        Sign of s − s' in different elements.
+    `integral` leads from the start of an element of length 1 to its nodes; `sides` is the sign of s
+    − s' in different elements.
     """
     out = 0.5 * sides[:, None, :, None] * weights[:, :, None, None] * weights
     for e, (here, length) in enumerate(zip(weights, lengths, strict=True)):
@@ -181,20 +175,9 @@ def lower_triangle(
 ) -> Entries:
     """Entries of F_z, row by row: ``K_ij − p ∂²V/∂θ_i∂θ_j``, then the multipliers' rows.
 
-    Parameters
-    ----------
-    theta
-        Unknown angles.
-    pull
-        Pressure p.
-    stiffness
-        K.
-    area, inner
-        V, and the nodes of the unknown angles.
-    diagonal
-        Further terms of the diagonal.
-    border, trailing
-        Gradients of the multipliers' constraints, and the block of the multipliers.
+    Of unknown angles θ under the pull p, which are the `inner` nodes of the area V; `diagonal` are
+    further terms of the diagonal, `border` the gradients of the multipliers' constraints,
+    `trailing` the block of the multipliers.
     """
     (lanes, n), m = theta.shape, border.shape[1]
     entries = np.empty((lanes, (n + m) * (n + m + 1) // 2))

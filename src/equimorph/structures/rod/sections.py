@@ -299,13 +299,7 @@ SECTIONS: dict[str, type[CrossSection]] = {
 
 
 def cross_section(given: Any) -> CrossSection:
-    """Section of plain data, like ``{"kind": "round", "diameter": ...}``, or the section itself.
-
-    Raises
-    ------
-    InputError
-        For anything else.
-    """
+    """Section of plain data, like ``{"kind": "round", "diameter": ...}``, or the section itself."""
     if isinstance(given, CrossSection):
         return given
     content = dict(given) if isinstance(given, Mapping) else {}

@@ -175,13 +175,7 @@ def lateral_mode(
 
 
 def check_terms(terms: dict[str, tuple[Term, ...]]) -> None:
-    """Refuse loads that have no potential in space.
-
-    Raises
-    ------
-    InputError
-        For pressure.
-    """
+    """Refuse loads that have no potential in space, such as pressure."""
     for name, acting in terms.items():
         if any(isinstance(term, Pressure) for term in acting):
             raise InputError(

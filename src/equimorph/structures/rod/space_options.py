@@ -31,10 +31,8 @@ class SpaceOptions:
     def check(self, EI: Any, length: Any) -> "SpaceOptions":
         """The same, if it is complete and says nothing twice.
 
-        Raises
-        ------
-        InputError
-            For one stiffness without the other, a section without length, or beside what it gives.
+        Refused are one stiffness without the other, a section without length, or beside what it
+        gives.
         """
         given = {"EI": EI, "torsion": self.torsion, "lateral": self.lateral}
         if self.section is not None:

@@ -357,13 +357,7 @@ REFUSED = {
 
 
 def term(data: Any, name: str) -> Term:
-    """Term of plain data, or the term itself.
-
-    Raises
-    ------
-    InputError
-        For anything else; follower loads are refused with the reason.
-    """
+    """Term of plain data, or the term itself; follower loads are refused with the reason."""
     if isinstance(data, Term):
         return data
     content = dict(data) if isinstance(data, Mapping) else {}

@@ -88,13 +88,7 @@ Ends = tuple[SpatialEnd, SpatialEnd]
 
 
 def spatial_end(spec: Any, name: str) -> SpatialEnd:
-    """End of a word, of plain data, or the end itself.
-
-    Raises
-    ------
-    InputError
-        For anything else.
-    """
+    """End of a word, of plain data, or the end itself."""
     if isinstance(spec, SpatialEnd):
         return spec
     if isinstance(spec, str) and spec in WORDS:
@@ -117,13 +111,7 @@ def support_axes(ends: Ends) -> tuple[Axis, ...]:
 
 
 def check_supports(ends: Ends) -> None:
-    """Refuse a rod that can move as a whole.
-
-    Raises
-    ------
-    InputError
-        If neither end holds a coordinate, or none holds the rotation.
-    """
+    """Refuse a rod that can move as a whole: no end holds a coordinate, or none the rotation."""
     for axis in AXES:
         if all(end.along(axis) == FREE for end in ends):
             raise InputError(

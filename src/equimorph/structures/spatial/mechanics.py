@@ -33,13 +33,7 @@ def step_tables(
 
     Nodes of elements stand in the order of elimination: inner ones, left, right. Tables of the
     scalars belong to those with entries only, whose numbers among (p, 1) come after each table.
-
-    Parameters
-    ----------
-    model
-        The rod.
-    lengths
-        Half the stiffness of the lengths of unknown quaternions.
+    `lengths` is half the stiffness of the lengths of unknown quaternions.
     """
     mesh, m = model.mesh, model.multipliers
     places = np.array([*range(1, mesh.degree), 0, mesh.degree])

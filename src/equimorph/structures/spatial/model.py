@@ -84,13 +84,7 @@ def effects(term: terms.Term, mesh: Mesh) -> SpatialEffects:
 
 
 def check_potential(name: str, term: terms.Term) -> None:
-    """Refuse what has no potential in space.
-
-    Raises
-    ------
-    InputError
-        For couples and pressure.
-    """
+    """Refuse what has no potential in space: couples and pressure."""
     if isinstance(term, terms.Couple):
         raise InputError(
             f"`{name}` must have a potential; got a couple: about an axis that stays where it is, "

@@ -155,13 +155,7 @@ def clamp_angles(q: Rotations) -> tuple[Values, Values, Values]:
 
 
 def planar_guess(mechanics: SpatialMechanics, state: Any) -> Lanes:
-    """Unknowns with the angles and the support forces of a planar rod's state.
-
-    Raises
-    ------
-    InputError
-        For anything but the state of a planar rod.
-    """
+    """Unknowns with the angles and support forces of a planar rod's state; others are refused."""
     if not (isinstance(state, State) and isinstance(state.structure, Measured)):
         raise InputError(f"`state` must be a state of a planar rod; got {state!r}.")
     rod = state.structure

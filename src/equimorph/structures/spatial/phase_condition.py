@@ -49,13 +49,7 @@ def with_phase_condition(model: SpatialModel) -> SpatialModel:
 
 
 def check_orbits(model: SpatialModel) -> None:
-    """Refuse a rod whose states cannot be turned about the x axis for nothing.
-
-    Raises
-    ------
-    InputError
-        With the first reason.
-    """
+    """Refuse a rod whose states cannot be turned about the x axis for nothing, with the reason."""
     reason = obstacle(model) or _obstacle_by_parameters(model)
     if reason:
         raise InputError(

@@ -62,13 +62,7 @@ class Unknowns:
     data: Mapping[str, int]
 
     def made(self, x: Vector) -> Structure:
-        """Structure of some unknowns.
-
-        Raises
-        ------
-        InputError
-            If no structure has such data, as with a stiffness that is not positive.
-        """
+        """Structure of some unknowns; refused if none has such data, like a negative stiffness."""
         values = {name: float(x[at]) for name, at in self.data.items()}
         if self.family is None or np.array_equal(x[list(self.data.values())], self._nominal):
             return self.structure

@@ -129,16 +129,9 @@ class RouteExtreme:
 def pass_piece(
     question: RouteExtreme, structure: Structure, point: CriticalPoint, reach: float
 ) -> Piece:
-    """Value of a pass, with the gradient of its Lagrangian.
+    """Value of a pass of a structure's route, with the gradient of its Lagrangian.
 
-    Parameters
-    ----------
-    question
-        The question of the route.
-    structure, point
-        The structure and its pass.
-    reach
-        Size of the cells around it, within which it is sought on other structures.
+    `reach` is the size of the cells around it, within which it is sought on other structures.
     """
     z, p, rows = point.point.z, point.point.p, point.point.rows
     programme = question.programme(structure)

@@ -82,13 +82,7 @@ class DesignFamily:
         return found
 
     def structure(self, x: Vector) -> Structure:
-        """Structure of scaled variables.
-
-        Raises
-        ------
-        InputError
-            If the family makes something else, or structures of different sizes.
-        """
+        """Structure of scaled variables; another thing, or one of another size, is refused."""
         key = x.tobytes()
         if key not in self._made:
             made = self.make(**self.values(x))

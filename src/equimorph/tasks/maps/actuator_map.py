@@ -171,23 +171,9 @@ def survey(
     """Compute a map over a grid, and the curves on which it is not smooth.
 
     Paths are followed from the natural states at all vertices, by workers if there are any: all the
-    rest is computed here, once. On edges over which the map jumps or
-    bends the exact places are found, and places of one kind are connected across the cells.
-
-    Parameters
-    ----------
-    paths
-        What the map reads at settings.
-    grid
-        The settings.
-    stage
-        Name of the computation for progress reports.
-    progress
-        Receives reports on the progress.
-    workers
-        Who follows the paths from the vertices.
-    near_curves
-        Paths with other step control for the places on edges; by default the same.
+    rest is computed here, once. On edges over which the map jumps or bends the exact places are
+    found, there by paths `near_curves` if they need other step control, and places of one kind are
+    connected across the cells. `stage` is the name of the computation in progress reports.
     """
     sink = progress or Silent()
     settings, shape = settings_of(grid)
@@ -212,17 +198,6 @@ def unloaded_base(
 ) -> Float[np.ndarray, " parameters"]:
     """All parameters of the unloaded structure at the lower corner of a grid.
 
-    Parameters
-    ----------
-    structure
-        The structure.
-    grid
-        Two parameters with their ranges and intervals.
-    load
-        Name of the load parameter of the map.
-    fixed
-        Values of other parameters.
-
     Raises
     ------
     InputError
@@ -241,24 +216,7 @@ def unloaded_base(
 def natural_states_over(
     structure: Structure, grid: Grid, load: str, fixed: Mapping[str, float] | None = None
 ) -> NaturalSheet:
-    """Unloaded states over a grid.
-
-    Parameters
-    ----------
-    structure
-        The structure; it must have natural states.
-    grid
-        Two parameters with their ranges and intervals.
-    load
-        Name of the load parameter of the map.
-    fixed
-        Values of other parameters; those not named keep their defaults.
-
-    Raises
-    ------
-    InputError
-        As for `unloaded_base`.
-    """
+    """Unloaded states over a grid; refused as by `unloaded_base`."""
     return natural_sheet(structure, grid, unloaded_base(structure, grid, load, fixed or {}))
 
 

@@ -85,15 +85,11 @@ class Places(Columns):
 
 
 def explain(paths: Paths, pairs: Brackets) -> tuple[Places, Brackets, Brackets]:
-    """Find the cause in each pair, and its exact place on the grid edge.
+    """Places with brackets around them; pairs without a cause; rest of the explained pairs.
 
     A cause counts if Newton's method finds its state inside the pair, and the map differs on both
-    sides close to it. All causes that the ends allow are tried, one after the other.
-
-    Returns
-    -------
-    Places with narrow brackets around them; pairs without a cause; remainders of the explained
-    pairs on both sides whose ends differ in kind.
+    sides close to it. All causes that the ends allow are tried, one after the other. The rest of a
+    pair are its parts on both sides of the place whose ends differ in kind.
     """
     found = candidates(paths, pairs)
     moving = np.argmax(np.abs(pairs.b.setting - pairs.a.setting), axis=1)

@@ -57,13 +57,7 @@ class Course:
 
     @classmethod
     def of(cls, start: State, legs: Sequence[Leg], actuators: Sequence[str]) -> "Course":
-        """Course of legs that all prescribe the same descriptors.
-
-        Raises
-        ------
-        InputError
-            If they do not, or one begins elsewhere than the one before ended.
-        """
+        """Course of legs that prescribe the same descriptors, each from the end of the last."""
         structure, p = start.structure, start.p[None]
         free = np.array([position(structure.parameters, name) for name in actuators])
         first = legs[0](0.0) if callable(legs[0]) else legs[0]
@@ -119,13 +113,7 @@ class Course:
 def actuator_bounds(
     structure: Structure, limits: Mapping[str, tuple[float, float]]
 ) -> tuple[Constraint, ...]:
-    """Limits of actuators as constraints.
-
-    Raises
-    ------
-    InputError
-        If limits are not in order.
-    """
+    """Limits of actuators as constraints; limits that are not in order are refused."""
     bounds: list[Constraint] = []
     for name, (low, high) in limits.items():
         if not low < high:

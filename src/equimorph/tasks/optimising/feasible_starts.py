@@ -60,16 +60,9 @@ def feasible_points_in_cells(
     constraints: tuple[Constraint, ...],
     cells: Cells,
 ) -> SetPoints:
-    """Feasible states in cells without feasible corners, each better than its neighbours.
+    """Feasible states in stable cells without feasible corners, each better than its neighbours.
 
-    Parameters
-    ----------
-    eset, programme
-        The set, and the problem on it.
-    constraints
-        Those that stable vertices may violate.
-    cells
-        Stable cells.
+    The constraints are those that stable vertices may violate.
     """
     promising, weights = _promising(eset, constraints, cells)
     found, kept = _restore_feasibility(programme, _inside(eset, promising, weights))

@@ -95,17 +95,8 @@ def passes_near(
     """Passes near each of some points, the nearest first; all are sought in one batch.
 
     Bounds that cannot be active there are left out, and examined at the passes that are found.
-
-    Parameters
-    ----------
-    programme
-        Objective and bounds.
-    starts
-        The points.
-    reach
-        Size of the cells around each of them, in the metric and scaled parameters.
-    like
-        A pass of a similar problem: the same functions are then held, right or not.
+    `reach` is the size of the cells around each point, in the metric and scaled parameters. The
+    functions that hold a similar pass `like` are held, right or not.
     """
     starts, found = project_onto_set(programme.setting, starts.z, starts.p, starts.rows)
     good = np.flatnonzero(found)
@@ -218,25 +209,12 @@ def _holds(programme: Programme, found: CriticalPoint) -> bool:
 def states_over(
     programme: Programme, found: CriticalPoint, reach: float, room: float
 ) -> States | None:
-    """States over a pass, inside all active bounds, that are hardly higher.
+    """States over a pass from one side to the other, inside active bounds, and hardly higher.
 
     With ``f ≈ c − ½ |λ| s² + ν δ + ½ η δ²`` a step s down the pass leaves room for a distance δ
-    from the bounds. Stations are denser where there is less of it.
-
-    Parameters
-    ----------
-    programme
-        Objective and bounds.
-    found
-        The pass.
-    reach
-        How far from it they lead, in the metric and scaled parameters.
-    room
-        How far they may exceed its value.
-
-    Returns
-    -------
-    States from one side to the other; None where no share of the room leads down on both sides.
+    from the bounds. Stations are denser where there is less of it. They lead as far as `reach`, in
+    the metric and scaled parameters, and exceed the pass by `room` at most; None where no share of
+    it leads down on both sides.
     """
     own, bounds = found.binding
     curvature, ways = curvatures(found, own, bounds)

@@ -46,14 +46,8 @@ def solve(problem: Quadratic, reach: float) -> QuadraticStep | None:
     """Solve by trying sets of up to d + 1 active rows; None without a feasible step.
 
     The programme is strictly convex: the first set whose KKT point is feasible, with multipliers
-    that are not negative, is the answer. Small sets are tried first.
-
-    Parameters
-    ----------
-    problem
-        The programme; d is at most a few.
-    reach
-        Bound of each coordinate of the step.
+    that are not negative, is the answer. Small sets are tried first; d is at most a few. `reach`
+    bounds each coordinate of the step.
     """
     d = problem.a.shape[1]
     # functions become the largest relative to the one that is so now

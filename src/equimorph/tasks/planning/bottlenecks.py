@@ -80,16 +80,7 @@ def find_bottleneck(
 ) -> Passing | None:
     """Lowest peak between two stable states of a set; None if no stable way within bounds is known.
 
-    Parameters
-    ----------
-    eset, ends
-        The set, and two of its stable states.
-    extreme
-        What is kept low, or high.
-    within
-        Constraints in addition to those of the set.
-    margin
-        Smallest stability margin.
+    Constraints come in addition to those of the set; `margin` is the smallest stability margin.
     """
     keeps = stability(eset.structure, margin)
     goal = Objective(extreme.descriptor, extreme.sign)

@@ -55,13 +55,7 @@ class Demands:
     def of(
         cls, structure: Structure, objective: Wish, within: Sequence[Constraint], margin: float
     ) -> "Demands":
-        """Check what a caller demands of a route.
-
-        Raises
-        ------
-        InputError
-            For an objective without meaning.
-        """
+        """Check what a caller demands of a route."""
         constraints = tuple(ease(each) for each in dict.fromkeys(within))
         return cls(objective_of(objective, structure), constraints, margin)
 

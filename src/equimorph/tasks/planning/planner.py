@@ -183,18 +183,8 @@ def surviving_route(
 ) -> Route:
     """Return the first route that survives errors, of those with growing least margins.
 
-    Parameters
-    ----------
-    eset, ends, demands
-        The set, start and goal, and what the route has to obey.
-    errors
-        What it has to survive.
-    planned
-        How routes are planned that meet demands.
-
-    Returns
-    -------
-    The route; or one that was refused, which says whether there is none or none was found.
+    Or one that was refused, which says whether there is none or none was found. `planned` plans
+    routes that meet demands.
     """
     for name, end in zip(("start", "goal"), ends, strict=True):
         found = rest_survives(end, errors, demands.constraints)

@@ -230,14 +230,8 @@ def cocycles(count: int, edges: Edges, triangles: Triangles) -> Values:
     """Integer cocycles that span the first cohomology of a surface; of edges from low to high.
 
     Spanning trees of the vertices and of the triangles with the outside are set to zero and solved
-    for [EricksonWhittlesey2005]_; the edges in neither tree generate.
-
-    Parameters
-    ----------
-    count
-        Number of vertices.
-    edges, triangles
-        With vertices in growing order; at most two triangles at an edge.
+    for [EricksonWhittlesey2005]_; the edges in neither tree generate. Vertices of edges and
+    triangles are in growing order; at most two triangles are at an edge.
     """
     code = np.array([count, 1])
     sides = np.stack([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [0, 2]]], axis=1)

@@ -342,20 +342,10 @@ def chance_of_missing(
     Balls of a radius ρ stand along the corridor, ρ apart. If a node of a tree lies in one of them
     and a sample falls into the next, the node nearest to the sample is at most 3ρ from it, so that
     a half width of 4ρ holds the straight lift to the sample, which a reach of 3ρ does not cut short
-    [KleinbortEtAl2019]_. In each round of uniform samples the next of K balls is met with the
-    probability b = 1 − (1 − V_d ρ^d)^batch, in all of them after n rounds with
-    P(Bin(n, b) ≥ K). Two trees that grow from both ends share the balls.
-
-    Parameters
-    ----------
-    width, length
-        Of the corridor.
-    actuators
-        Number d of dimensions.
-    rounds, batch
-        Rounds of samples for which trees do not grow in between, and samples in each.
-    reach
-        Longest extension of a tree.
+    [KleinbortEtAl2019]_. In each round of uniform samples, between which trees do not grow, the
+    next of K balls is met with the probability b = 1 − (1 − V_d ρ^d)^batch, in all of them after n
+    rounds with P(Bin(n, b) ≥ K); d counts the actuators. Two trees that grow from both ends share
+    the balls.
     """
     radius = min(width / 8.0, reach / 3.0)
     ball = min(1.0, pi ** (0.5 * actuators) / gamma(0.5 * actuators + 1.0) * radius**actuators)

@@ -190,13 +190,7 @@ class ErringStructure:
         return np.asarray(offsets[:, [names.index(name) for name in self.data]])
 
     def made(self, shares: Sequence[float]) -> Structure:
-        """Structure with relative errors of the data.
-
-        Raises
-        ------
-        InputError
-            If no structure has such data.
-        """
+        """Structure with relative errors of the data; refused if none has such data."""
         identity = self._identity
         for name, share in zip(self.data, shares, strict=True):
             identity = _scale(identity, name, 1.0 + share)[0]

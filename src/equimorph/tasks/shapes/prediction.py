@@ -197,17 +197,8 @@ def states_with_values(
 ) -> Settled:
     """Solve F(z; p) = 0 and S(z, p) = S* from guesses near a set.
 
-    Folds are regular points. With fewer descriptors than free parameters the steps along the set
-    are the shortest ones.
-
-    Parameters
-    ----------
-    setting
-        Structure and free parameters.
-    at
-        Guesses, with bases of spaces near the tangent spaces.
-    targets
-        S* for each lane; at most d descriptors.
+    The guesses come with bases of spaces near the tangent spaces. Folds are regular points. With
+    fewer descriptors than free parameters the steps along the set are the shortest ones.
     """
     structure, free = setting.structure, setting.free
     directions = free_directions(structure, free, len(at))
@@ -231,14 +222,8 @@ def best_fits(
 ) -> tuple[States, Float[np.ndarray, " fits"]]:
     """Local minima of ``Σ ((S − S*)/range)²``, the best first, and the roots of these sums.
 
-    Minima at the sides of the box and on constraints count, too.
-
-    Parameters
-    ----------
-    within
-        Constraints, those of the set among them.
-    allowed
-        Vertices from which to search; all if None.
+    Minima at the sides of the box and on constraints, those of the set among them, count, too. The
+    search starts from the vertices that are allowed, by default from all.
     """
     eset, spread = known.eset, known.spread
     squares = function_of(
