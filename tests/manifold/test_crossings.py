@@ -8,6 +8,7 @@ from draws import few
 from equimorph import lift, plotting, storage
 from equimorph.manifold import (
     EquilibriumSet,
+    VertexKind,
     cell_sizes,
     equilibrium_set,
     locate,
@@ -428,6 +429,19 @@ def test_side_branches_that_leave_the_constraint_within_a_cell_are_strips(slant,
     plane = 2.1 * 2.2
     strip = 2.0 * np.linalg.norm(np.cross([cap, cap**2, 0.0], [0.0, -2.2 * slant, 2.2]))
     assert cell_sizes(eset).sum() == pytest.approx(plane + strip, abs=strip * cap**2)
+
+
+@pytest.mark.parametrize("cap", [0.3, 1e-2, 1e-3, 1e-4, 1e-5])
+def test_side_branches_of_a_diagram_may_leave_the_constraint_within_an_interval(cap):
+    """x (x² − a) over a with |x| ≤ cap: an arc of the side branch over a ≤ cap², and the line."""
+    size = Descriptor("size", "1", lambda z, p: np.abs(z[:, 0]))
+    box, within = Box(a=(-1, 1.3)), [size <= cap]
+    eset = lifted(pitchforks(1.0, 0.0), box, fixed={"b": 0.0}, within=within, intervals=(5,))
+    assert_faithful(eset)
+    assert_crossings(eset)
+    assert sorted(stratum.index for stratum in eset.strata) == [0, 0, 0, 1]
+    ends = eset.points.z[eset.kinds == VertexKind.CAP, 0]
+    assert np.sort(ends) == pytest.approx([-cap, cap], rel=1e-9)
 
 
 def test_crossing_leaves_through_the_constraint_that_bounds_its_side_branches():

@@ -198,6 +198,8 @@ def _segments(pairing: Pairing) -> Cells:
         if pairing.ray(start, edge) == curve:
             line = [start, *curves.inner.get(curve, []), *([end] if end >= 0 else [])]
             pairs.extend(pairwise(line))
+    for arc in (arc for arcs in pairing.arcs.values() for arc in arcs):
+        pairs.extend(pairwise(arc))
     corners = np.array(pairs, int).reshape(-1, 2)
     kind, index = points.kind[: points.count], points.index[: points.count]
     # of two neighbours on a curve at most one is singular
