@@ -26,6 +26,12 @@ class DirectModel(Model):
     """A structure whose equations a plant takes over unknown by unknown."""
 
     def __init__(self, structure: Structure, start: State) -> None:
+        if structure.sprung is not None:
+            raise InputError(
+                "`structure` must not move with springs at its supports whose places its unknowns "
+                f"leave free; this {structure.kind} does. Replay its schedule in MuJoCo, or hold "
+                "these supports."
+            )
         self.structure = structure
         self.frequency = float(start.batch.natural_frequencies(1)[0, 0])
         self.unit = FIRST_MODE / self.frequency

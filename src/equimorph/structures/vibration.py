@@ -1,18 +1,17 @@
-"""Natural frequencies: small free vibrations about stable states; masses of material points.
+"""Natural frequencies: small free vibrations about stable states.
 
 The constrained eigenproblem ``L_uu v + c_uᵀ μ = ω² M v``, ``c_u v = 0`` with the physical mass
 matrix M of `Structure.inertia`.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
-from equimorph.arrays import Float, Lanes, Parameters, Velocity
+from equimorph.arrays import Float, Lanes, Parameters
 from equimorph.errors import InputError
 from equimorph.structures.contract import Structure
-from equimorph.structures.equations import Equations
+from equimorph.structures.inertial import Product
 
 GUARD = 4
 """Vectors beyond those asked for: subspace iteration converges by the ratio to the next one."""
@@ -38,6 +37,7 @@ def vibrations(structure: Structure, z: Lanes, p: Parameters, count: int) -> Vib
     """Lowest modes of stable states, by subspace iteration with the constrained Hessian.
 
     Each step solves with F_z and takes the best combinations (Rayleigh and Ritz) of all vectors.
+    Springs at supports that the unknowns leave free have coordinates of their own.
 
     Raises
     ------
@@ -55,29 +55,66 @@ def vibrations(structure: Structure, z: Lanes, p: Parameters, count: int) -> Vib
             f"`state` must be stable to vibrate; got one that is not, state {int(unstable[0])} of "
             f"{len(z)}."
         )
-    free = structure.unknowns - structure.constraints
+    moving = _Moving.of(structure, z, p)
+    free = moving.coordinates - structure.constraints
     if not 1 <= count <= free:
         raise InputError(f"`count` must be from 1 to {free}, the free movements; got {count!r}.")
-    product = structure.inertia_product(z, p)
-    width = min(count + GUARD, structure.unknowns)
-    vectors = np.random.default_rng(0).normal(size=(len(z), width, structure.unknowns))
-    solve = structure.linear_system(z, p, np.zeros((len(z), 0, p.shape[1]))).solve
+    width = min(count + GUARD, moving.coordinates)
+    vectors = np.random.default_rng(0).normal(size=(len(z), width, moving.coordinates))
     last = np.zeros((len(z), count))
-    rhs = np.zeros((len(z), width, structure.size))
     for _ in range(SWEEPS):
-        rhs[:, :, : structure.unknowns] = product(vectors)
-        moved = solve(rhs, None).x[:, :, : structure.unknowns]
-        stiff = moved @ rhs[:, :, : structure.unknowns].transpose(0, 2, 1)
-        inverse, vectors = _ritz(stiff, moved @ product(moved).transpose(0, 2, 1), moved)
+        forces = moving.inertia(vectors)
+        moved = moving.response(forces)
+        stiff = moved @ forces.transpose(0, 2, 1)
+        heavy = moved @ moving.inertia(moved).transpose(0, 2, 1)
+        inverse, vectors = _ritz(stiff, heavy, moved)
         now = inverse[:, :count]
         if (np.abs(now - last) <= RELATIVE * now).all():
             break
         last = now
-    size = np.sqrt(np.einsum("lki,lki->lk", vectors, product(vectors)))
+    size = np.sqrt(np.einsum("lki,lki->lk", vectors, moving.inertia(vectors)))
     with np.errstate(divide="ignore", invalid="ignore"):
         frequencies = 1.0 / np.sqrt(np.maximum(inverse[:, :count], 0.0))
-        modes = (vectors / size[:, :, None])[:, :count]
+        modes = (vectors / size[:, :, None])[:, :count, : structure.unknowns]
     return Vibrations(frequencies, modes)
+
+
+@dataclass(frozen=True)
+class _Moving:
+    """Masses and compliance of some states in the coordinates that move mass.
+
+    These are the unknowns, and the places of springs that do not follow from them.
+    """
+
+    coordinates: int
+    inertia: Product
+    response: Product
+
+    @classmethod
+    def of(cls, structure: Structure, z: Lanes, p: Parameters) -> "_Moving":
+        """Of states; the response to forces keeps the constraints."""
+        n, size = structure.unknowns, structure.size
+        solve = structure.linear_system(z, p, np.zeros((len(z), 0, p.shape[1]))).solve
+        sprung = structure.sprung
+        if sprung is None:
+
+            def response(forces: np.ndarray) -> np.ndarray:
+                rhs = np.zeros((*forces.shape[:2], size))
+                rhs[:, :, :n] = forces
+                return np.asarray(solve(rhs, None).x[:, :, :n])
+
+            return cls(n, structure.inertia_product(z, p), response)
+        mass, springs = sprung.inertia(z, p), sprung.springs
+
+        def response_with_springs(forces: np.ndarray) -> np.ndarray:
+            rhs = np.zeros((*forces.shape[:2], size))
+            given = forces[:, :, n:] / springs.stiffness
+            rhs[:, :, :n], rhs[:, :, n:] = forces[:, :, :n], -given @ springs.gaps.T
+            x = solve(rhs, None).x
+            away = x[:, :, n:] @ springs.gaps / springs.stiffness
+            return np.concatenate([x[:, :, :n], given - away], axis=2)
+
+        return cls(n + len(springs.stiffness), lambda v: v @ mass, response_with_springs)
 
 
 def _ritz(
@@ -96,75 +133,3 @@ def _ritz(
     values, turned = np.linalg.eigh(reduce.transpose(0, 2, 1) @ heavy @ reduce)
     best = (reduce @ turned)[:, :, ::-1]
     return values[:, ::-1], best.transpose(0, 2, 1) @ vectors
-
-
-STEP = 1e-3
-"""Step of the differences, of unknowns of size one: errors of 1e-13 of truncation and round-off."""
-RANK = 1e-10
-"""Relative size below which a compliance counts as none: such constraints do not give way."""
-
-Places = Callable[[Lanes, Parameters], Float[np.ndarray, "many points space"]]
-
-
-@dataclass(frozen=True)
-class MaterialPoints:
-    """Masses at places, which are functions of unknowns and multipliers.
-
-    Derivatives are differenced to fourth order. Where constraints ``c(u, λ) = 0`` give way, the
-    multipliers follow from the unknowns: ``c_u δu + c_λ δλ = 0``.
-    """
-
-    equations: Equations
-    places: Places
-    masses: Float[np.ndarray, " points"]
-
-    def inertia(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes unknowns unknowns"]:
-        """Mass matrix JᵀWJ."""
-        n = self.equations.unknowns
-        out = np.empty((len(z), n, n))
-        for lane in range(len(z)):
-            flat, weights, _ = self._moved(z[lane], p[lane])
-            out[lane] = flat.T @ (weights[:, None] * flat)
-        return out
-
-    def inertial_force(self, z: Lanes, p: Parameters, velocity: Velocity) -> Velocity:
-        """``JᵀW D²x[u̇, u̇]``, with the second derivative of all places along the velocity."""
-        out = np.zeros_like(velocity)
-        for lane, rate in enumerate(velocity):
-            size = float(np.abs(rate).max())
-            if size == 0.0:
-                continue
-            flat, weights, follow = self._moved(z[lane], p[lane])
-            way = STEP * np.concatenate([rate, follow @ rate]) / size
-            at = z[lane] + np.array([-2.0, -1.0, 0.0, 1.0, 2.0])[:, None] * way
-            x = self.places(at, np.repeat(p[lane][None], 5, axis=0)).reshape(5, -1)
-            bend = np.array([-1.0, 16.0, -30.0, 16.0, -1.0]) @ x / (12.0 * (STEP / size) ** 2)
-            out[lane] = flat.T @ (weights * bend)
-        return out
-
-    def _moved(
-        self, z: Float[np.ndarray, " size"], p: Float[np.ndarray, " parameters"]
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Derivatives of all coordinates by the unknowns, their masses, rates of multipliers."""
-        n = self.equations.unknowns
-        moved = _derivative(self.places, z, p)
-        follow = np.zeros((self.equations.constraints, n))
-        if self.equations.constraints:
-            rows = _derivative(self.equations.residual, z, p)[n:]
-            follow = -np.linalg.pinv(rows[:, n:], rcond=RANK, hermitian=True) @ rows[:, :n]
-            moved = moved[..., :n] + moved[..., n:] @ follow
-        return moved.reshape(-1, n), np.repeat(self.masses, moved.shape[1]), follow
-
-
-def _derivative(
-    function: Callable[[Lanes, Parameters], np.ndarray],
-    z: Float[np.ndarray, " size"],
-    p: Float[np.ndarray, " parameters"],
-) -> Float[np.ndarray, "... size"]:
-    """Derivatives of values at one state by all entries of z, along the last axis."""
-    steps = STEP * np.eye(len(z))
-    at = np.concatenate([z + share * steps for share in (1.0, -1.0, 2.0, -2.0)])
-    values = function(at, np.repeat(p[None], len(at), axis=0))
-    ahead, behind, twice, back = values.reshape(4, len(z), *values.shape[1:])
-    slope = (8.0 * (ahead - behind) - (twice - back)) / (12.0 * STEP)
-    return np.asarray(np.moveaxis(slope, 0, -1))

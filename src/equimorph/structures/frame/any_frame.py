@@ -21,10 +21,10 @@ from equimorph.model import (
 )
 from equimorph.structures.collapse import Shortening
 from equimorph.structures.frame.strength import StressedFrame
+from equimorph.structures.material_points import MaterialPoints, SprungPoints, SupportSprings
 from equimorph.structures.network import direction_of_mechanism
 from equimorph.structures.resolution import Refinable
 from equimorph.structures.rod.discretisation import error_by_refinement
-from equimorph.structures.vibration import MaterialPoints
 from equimorph.tolerances import SINGULAR
 
 WALKED = 17
@@ -325,6 +325,22 @@ class AnyFrame(StressedFrame, Shortening, Refinable):
         if own is None:
             return super().inertial_force(z, p, velocity)
         return own.inertial_force(z, p, velocity)
+
+    @property
+    @abstractmethod
+    def springs_of_joints(self) -> list[tuple[float, np.ndarray, np.ndarray]]:
+        """Stiffness of each spring along an axis, gaps that it opens, and moves of all joints."""
+
+    @property
+    def sprung(self) -> SprungPoints | None:
+        """Points of the members, where the unknowns leave springs at supports free."""
+        points = self._material
+        if points is None:
+            return None
+        starts = np.repeat(self.network.ends[:, 0], len(self.model.mesh.weights))
+        each = [(stiff, gaps, moves[starts]) for stiff, gaps, moves in self.springs_of_joints]
+        springs = SupportSprings.of(each, self.constraints, self.network.space)
+        return None if springs.follow else SprungPoints(points, springs)
 
     @property
     def _material(self) -> MaterialPoints | None:

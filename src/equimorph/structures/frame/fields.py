@@ -50,6 +50,17 @@ class FrameFields(FrameMechanics, AnyFrame):
         return tuple((each.members[:, self.model.owner], each.supports) for each in found)
 
     @property
+    def springs_of_joints(self) -> list[tuple[float, np.ndarray, np.ndarray]]:
+        """Of the supports in x and in y."""
+        found = []
+        for axis, (_, carried) in enumerate(self._unit_loads):
+            stiff = self.model.supports[:, axis]
+            for j in np.flatnonzero((stiff > 0.0) & np.isfinite(stiff)):
+                gaps = self._reactions[axis][j, : self.constraints]
+                found.append((stiff[j], gaps, -carried[:, j, None] * np.eye(2)[axis]))
+        return found
+
+    @property
     def _reactions(self) -> tuple[np.ndarray, np.ndarray]:
         """Forces of the supports by scalar."""
         x, y = (forces.supports.T for forces in self.model.forces)

@@ -27,11 +27,17 @@ from equimorph.structures.equations import (
     Shift,
     Solver,
 )
+from equimorph.structures.material_points import MaterialPoints, SprungPoints
 from equimorph.structures.rod.discretisation import Reference
 from equimorph.structures.rod.general_fields import GeneralFields
 from equimorph.structures.rod.general_kernels import linearise_lanes, second_lanes
 from equimorph.structures.rod.general_step_kernels import advance_lanes
-from equimorph.structures.rod.inertia import following, moved_places, place_derivatives
+from equimorph.structures.rod.inertia import (
+    following,
+    moved_places,
+    nodal_places,
+    place_derivatives,
+)
 from equimorph.structures.rod.mechanics import LARGEST_TAIL, PlanarMechanics
 from equimorph.structures.rod.model import RodModel, pack_tables
 from equimorph.structures.rod.planar_energy import PlanarEnergy
@@ -221,6 +227,17 @@ class GeneralMechanics(JointEquations, PlanarMechanics):
         theta, y = self.nodal_angles(z, p), self.scalars(z, p)
         out = self._gradient(theta, y) + self._end_moments(theta, y) @ self.model.turned
         return np.ascontiguousarray(out[:, self.constraints : -1])
+
+    @property
+    def sprung(self) -> SprungPoints | None:
+        """Its nodes on springs at both ends, or at one where the other end is free."""
+
+        def places(z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes nodes 2"]:
+            return nodal_places(self.model, self.nodal_angles(z, p), self.scalars(z, p))
+
+        springs = self.model.springs_along
+        points = MaterialPoints(self, places, self.mesh.weights)
+        return None if springs.follow else SprungPoints(points, springs)
 
     def inertia(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes unknowns unknowns"]:
         """JᵀWJ of the unknown angles."""

@@ -6,6 +6,7 @@ Cross-sections have no rotary inertia, as is right for slender rods.
 """
 
 from abc import abstractmethod
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -13,6 +14,7 @@ import numpy as np
 from equimorph.arrays import Float, Lanes, Nodal, Parameters, Scalars, Velocity
 from equimorph.model import Parameter
 from equimorph.structures.collapse import Shortening
+from equimorph.structures.material_points import SprungPoints
 from equimorph.structures.rod.discretisation import Mesh
 from equimorph.structures.rod.model import RodModel
 from equimorph.structures.rod.units import Units
@@ -54,6 +56,19 @@ def _integration(mesh: Mesh) -> Float[np.ndarray, "nodes points"]:
         out[nodes, e] = mesh.lengths[e] * mesh.reference.integral
         out[nodes[-1] + 1 :, e] = mesh.element_weights[e]
     return out.reshape(len(out), -1)
+
+
+def nodal_places(model: RodModel, theta: Nodal, y: Scalars) -> Float[np.ndarray, "lanes nodes 2"]:
+    """Places of all nodes, by the integrals whose derivatives `place_derivatives` gives."""
+    angles = theta[:, model.mesh.element_nodes.ravel()]
+    sine, cosine = np.sin(angles), np.cos(angles)
+    normal = (y @ model.sine) * sine + (y @ model.cosine) * cosine + y @ model.tension
+    stretch, integral = 1.0 - model.softness * normal, _integration(model.mesh)
+    out = np.empty((len(theta), len(model.mesh.nodes), 2))
+    for axis, turned in enumerate((cosine, sine)):
+        whole = integral if model.from_start[axis] else integral - integral[-1]
+        out[:, :, axis] = (stretch * turned) @ whole.T + (y @ model.origin[axis])[:, None]
+    return out
 
 
 def place_derivatives(model: RodModel, theta: Nodal, y: Scalars) -> tuple[Turns, Pulls]:
@@ -118,6 +133,20 @@ class HeavyRod(Shortening):
     @abstractmethod
     def inertial_force_in_lengths(self, z: Lanes, p: Parameters, velocity: Velocity) -> Velocity:
         """Γ of a rod of mass 1, see `Structure.inertial_force`, in units of its mass and length."""
+
+    @property
+    @abstractmethod
+    def sprung_in_lengths(self) -> SprungPoints | None:
+        """Points of a rod of mass 1 on springs that the unknowns leave free; None without these."""
+
+    @property
+    def sprung(self) -> SprungPoints | None:
+        """Its points on springs at both ends, or at one where the other end is free."""
+        unit, found = self.units.time(), self.sprung_in_lengths
+        if unit is None or found is None:
+            return None
+        points = replace(found.points, masses=unit**2 * found.points.masses)
+        return replace(found, points=points)
 
     @property
     def time_unit(self) -> str:

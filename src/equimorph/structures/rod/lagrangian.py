@@ -8,6 +8,7 @@ from typing import Any, ClassVar, TypeVar
 import numpy as np
 
 from equimorph.arrays import Float
+from equimorph.structures.material_points import SupportSprings
 from equimorph.structures.rod.discretisation import Mesh
 from equimorph.structures.rod.ends import FREE, Axis, compliance
 
@@ -34,6 +35,8 @@ class RodLagrangian(ABC):
     origin
         Coordinates of end A, or of end B where `from_start` is False. Like all rows, they combine
         the scalars.
+    springs_along
+        Springs of the ends along axes.
     """
 
     rows: ClassVar[tuple[str, ...]]
@@ -49,6 +52,7 @@ class RodLagrangian(ABC):
     reaction: Float[np.ndarray, "axes scalars"]
     origin: Float[np.ndarray, "axes scalars"]
     from_start: tuple[bool, ...]
+    springs_along: SupportSprings
 
     @property
     def scalars(self) -> int:
@@ -86,6 +90,7 @@ class SupportEnergy:
     reaction: Rows
     origin: Rows
     from_start: tuple[bool, ...]
+    springs: SupportSprings
 
 
 def support_energy(
@@ -107,7 +112,8 @@ def support_energy(
     count, multiplier = len(forces), 0
     quadratic = np.zeros((count, count))
     reactions, origin = np.zeros((2, forces.shape[1], count))
-    from_start = []
+    from_start, soft = [], []
+    multipliers = sum(axis.opposed for axis in axes)
     for axis in axes:
         unit = np.array(axis.unit)
         total = forces @ unit
@@ -128,5 +134,20 @@ def support_energy(
             quadratic -= compliance(axis.last) * np.outer(rest, rest)
         if axis.first == FREE:
             origin += compliance(axis.last) * np.outer(unit, rest)
+        soft += _springs_of(axis, reaction[:multipliers], rest[:multipliers])
         from_start.append(axis.first != FREE)
-    return SupportEnergy(quadratic, reactions, origin, tuple(from_start))
+    springs = SupportSprings.of(soft, multipliers, forces.shape[1])
+    return SupportEnergy(quadratic, reactions, origin, tuple(from_start), springs)
+
+
+def _springs_of(
+    axis: Axis, first: Float[np.ndarray, " multipliers"], last: Float[np.ndarray, " multipliers"]
+) -> list[tuple[float, np.ndarray, np.ndarray]]:
+    """Stiffness, gap and moves of the springs at A and B; the rod is drawn from the first held."""
+    unit, drawn_from_last = np.array([axis.unit]), axis.first == FREE
+    both = (axis.first, first, not drawn_from_last), (axis.last, -last, drawn_from_last)
+    return [
+        (held, gap, unit if moves else 0.0 * unit)
+        for held, gap, moves in both
+        if not isinstance(held, str)
+    ]

@@ -191,6 +191,7 @@ def raw_model(build: Build) -> RodModel:
         reaction=supports.reaction,
         origin=supports.origin,
         from_start=supports.from_start,
+        springs_along=supports.springs,
         stiffness=stiffness,
         bending_stiffness=bending,
         nodal=nodal,

@@ -13,6 +13,7 @@ import numpy as np
 from equimorph.arrays import Float, Lanes, Parameters, Values, Velocity
 from equimorph.errors import MissingError
 from equimorph.structures.contract import Readers, Written
+from equimorph.structures.material_points import SprungPoints
 from equimorph.structures.rod.any_description import RodDescription
 from equimorph.structures.rod.any_rod import AnyRod, Arclengths
 from equimorph.structures.rod.centreline import Centreline
@@ -101,6 +102,11 @@ class Measured(StressedRod):
         tangents = np.stack([np.cos(angles), np.sin(angles)], axis=2)
         left = np.stack([-tangents[:, :, 1], tangents[:, :, 0]], axis=2)
         return Centreline(fields[:, :, 2:], tangents, left[:, :, None], bending * left, length)
+
+    @property
+    def sprung_in_lengths(self) -> SprungPoints | None:
+        """Points of a rod of mass 1 on springs that the unknowns leave free."""
+        return self.mechanics.sprung
 
     def inertia_in_lengths(
         self, z: Lanes, p: Parameters

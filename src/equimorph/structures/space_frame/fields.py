@@ -86,6 +86,19 @@ class SpatialFrameFields(SpatialFrameMechanics, AnyFrame):
         moves -= np.einsum("fja,lja->lf", supports, given)
         return np.asarray(moves.reshape(len(z), len(model.network.joints), 3))
 
+    @property
+    def springs_of_joints(self) -> list[tuple[float, np.ndarray, np.ndarray]]:
+        """Of the supports along their directions."""
+        model, found = self.model, []
+        carried, cube = self._unit_loads.supports, model.length**3 / model.bending
+        for j, support in enumerate(model.network.supports):
+            for unit, stiff in zip(support.directions, support.stiffness, strict=True):
+                if np.isfinite(stiff):
+                    gaps = model.forces.supports[: self.constraints, j] @ unit
+                    moves = -(carried[:, j] @ unit).reshape(-1, 3)
+                    found.append((stiff * cube, gaps, moves))
+        return found
+
     def reactions(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes joints 3"]:
         """Forces of the supports on the joints."""
         return np.asarray(np.einsum("ls,sja->lja", self.scalars(z, p), self.model.forces.supports))

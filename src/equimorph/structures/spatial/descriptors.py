@@ -11,6 +11,7 @@ from equimorph.arrays import Float, Lanes, Parameters, Values, Velocity
 from equimorph.errors import InputError
 from equimorph.model import Descriptor, remember_call
 from equimorph.structures.contract import Written
+from equimorph.structures.material_points import MaterialPoints, SprungPoints
 from equimorph.structures.rod.any_rod import Arclengths, Field, Peaks, arclengths
 from equimorph.structures.rod.centreline import Centreline
 from equimorph.structures.rod.extrema import peaks, stations
@@ -21,7 +22,6 @@ from equimorph.structures.spatial.mechanics import SpatialMechanics
 from equimorph.structures.spatial.orbits import on_orbit
 from equimorph.structures.spatial.phase import PinnedMechanics
 from equimorph.structures.states import State
-from equimorph.structures.vibration import MaterialPoints
 
 STRAINS = {"twist": "κ_t", "side_curvature": "κ_n", "curvature": "κ_b"}
 """Strains in the order in which fields have them, with their symbols."""
@@ -85,6 +85,12 @@ class DescribedInSpace(StressedRod):
     def inertial_force_in_lengths(self, z: Lanes, p: Parameters, velocity: Velocity) -> Velocity:
         """Γ of the same masses."""
         return self._material.inertial_force(z, p, velocity)
+
+    @property
+    def sprung_in_lengths(self) -> SprungPoints | None:
+        """Points of a rod of mass 1 on springs that the unknowns leave free."""
+        springs = self.mechanics.model.springs_along
+        return None if springs.follow else SprungPoints(self._material, springs)
 
     @property
     def _material(self) -> MaterialPoints:

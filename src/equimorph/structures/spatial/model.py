@@ -233,6 +233,7 @@ def raw_model(build: Build) -> SpatialModel:
         reaction=supports.reaction,
         origin=supports.origin,
         from_start=supports.from_start,
+        springs_along=supports.springs,
         stiffness=stiffness,
         softness=softness,
         force=force,

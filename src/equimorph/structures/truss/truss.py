@@ -12,8 +12,9 @@ from equimorph.arrays import Float, Lanes, Parameters, Values, Velocity
 from equimorph.errors import InputError
 from equimorph.model import Descriptor, remember_call
 from equimorph.structures.collapse import Shortening
-from equimorph.structures.contract import Product, Symmetry
+from equimorph.structures.contract import Symmetry
 from equimorph.structures.discrete import correct_at_parameters
+from equimorph.structures.inertial import Product
 from equimorph.structures.network import Joints, check_parameter_names, direction_of_mechanism
 from equimorph.structures.truss.mechanics import BarValues, TrussMechanics, symmetries
 from equimorph.structures.truss.network import (

@@ -1,0 +1,143 @@
+"""Masses of material points of rods and frames, and springs at their supports."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from equimorph.arrays import Float, Lanes, Parameters, Velocity
+from equimorph.structures.equations import Equations
+
+STEP = 1e-3
+"""Step of the differences, of unknowns of size one: errors of 1e-13 of truncation and round-off."""
+RANK = 1e-10
+"""Relative size below which a compliance counts as none: such constraints do not give way."""
+
+Places = Callable[[Lanes, Parameters], Float[np.ndarray, "many points space"]]
+
+
+@dataclass(frozen=True)
+class SupportSprings:
+    """Springs against movements of supports along x, y or z, whose places s statics eliminates.
+
+    In u and s the Lagrangian is ``L₀(u, λ) + λ·(gaps s) + ½ s·(k s)`` and terms of the parameters:
+    the constraints change by ``gaps δs``, and the places of the material points by ``moves``.
+    """
+
+    stiffness: Float[np.ndarray, " springs"]
+    gaps: Float[np.ndarray, "constraints springs"]
+    moves: Float[np.ndarray, "springs points_or_1 space"]
+
+    @classmethod
+    def of(
+        cls, springs: Sequence[tuple[float, np.ndarray, np.ndarray]], constraints: int, space: int
+    ) -> "SupportSprings":
+        """Of the stiffness, the gaps and the moves of each, of which there may be none."""
+        points = len(springs[0][2]) if springs else 1
+        stiffness = np.array([each[0] for each in springs])
+        gaps = np.array([each[1] for each in springs]).reshape(len(springs), constraints).T
+        moves = np.array([each[2] for each in springs]).reshape(len(springs), points, space)
+        return cls(stiffness, gaps, moves)
+
+    @property
+    def follow(self) -> bool:
+        """Whether the constraints tie all places of springs to the unknowns."""
+        count = len(self.stiffness)
+        return count == 0 or (self.gaps.size > 0 and np.linalg.matrix_rank(self.gaps) == count)
+
+
+@dataclass(frozen=True)
+class MaterialPoints:
+    """Masses at places, which are functions of unknowns and multipliers.
+
+    Derivatives are differenced to fourth order. Where constraints ``c(u, λ) = 0`` give way, the
+    multipliers follow from the unknowns: ``c_u δu + c_λ δλ = 0``.
+    """
+
+    equations: Equations
+    places: Places
+    masses: Float[np.ndarray, " points"]
+
+    def inertia(
+        self, z: Lanes, p: Parameters, springs: SupportSprings | None = None
+    ) -> Float[np.ndarray, "lanes coordinates coordinates"]:
+        """Mass matrix JᵀWJ of the unknowns, and of the springs' places after them."""
+        count = self.equations.unknowns + (0 if springs is None else len(springs.stiffness))
+        out = np.empty((len(z), count, count))
+        for lane in range(len(z)):
+            flat, weights, _ = self._moved(z[lane], p[lane], springs)
+            out[lane] = flat.T @ (weights[:, None] * flat)
+        return out
+
+    def inertial_force(self, z: Lanes, p: Parameters, velocity: Velocity) -> Velocity:
+        """``JᵀW D²x[u̇, u̇]``, with the second derivative of all places along the velocity."""
+        out = np.zeros_like(velocity)
+        for lane, rate in enumerate(velocity):
+            size = float(np.abs(rate).max())
+            if size == 0.0:
+                continue
+            flat, weights, follow = self._moved(z[lane], p[lane])
+            way = STEP * np.concatenate([rate, follow @ rate]) / size
+            at = z[lane] + np.array([-2.0, -1.0, 0.0, 1.0, 2.0])[:, None] * way
+            x = self.places(at, np.repeat(p[lane][None], 5, axis=0)).reshape(5, -1)
+            bend = np.array([-1.0, 16.0, -30.0, 16.0, -1.0]) @ x / (12.0 * (STEP / size) ** 2)
+            out[lane] = flat.T @ (weights * bend)
+        return out
+
+    def _moved(
+        self,
+        z: Float[np.ndarray, " size"],
+        p: Float[np.ndarray, " parameters"],
+        springs: SupportSprings | None = None,
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Derivatives of all coordinates by the unknowns, their masses, rates of multipliers."""
+        n, c = self.equations.unknowns, self.equations.constraints
+        places = _derivative(self.places, z, p)
+        weights, places = np.repeat(self.masses, places.shape[1]), places.reshape(-1, n + c)
+        rows = _derivative(self.equations.residual, z, p)[n:] if c else np.zeros((0, n))
+        moved, forced, gradients, corner = places[:, :n], places[:, n:], rows[:, :n], rows[:, n:]
+        size = np.abs(corner).max(initial=0.0)
+        if springs is not None:
+            spread = (len(springs.stiffness), len(self.masses), springs.moves.shape[2])
+            own = np.broadcast_to(springs.moves, spread).reshape(spread[0], -1).T
+            pulled = springs.gaps.T / springs.stiffness[:, None]
+            moved, forced = np.concatenate([moved, own], axis=1), forced + own @ pulled
+            gradients = np.concatenate([gradients, springs.gaps], axis=1)
+            corner = corner + springs.gaps @ pulled
+        follow = -_inverse(corner, RANK * size) @ gradients
+        return moved + forced @ follow, weights, follow
+
+
+def _inverse(matrix: Float[np.ndarray, "c c"], least: float) -> Float[np.ndarray, "c c"]:
+    """Inverse of a symmetric matrix where its eigenvalues are larger than the least."""
+    values, vectors = np.linalg.eigh(0.5 * (matrix + matrix.T))
+    kept = np.abs(values) > least
+    return np.asarray((vectors[:, kept] / values[kept]) @ vectors[:, kept].T)
+
+
+def _derivative(
+    function: Callable[[Lanes, Parameters], np.ndarray],
+    z: Float[np.ndarray, " size"],
+    p: Float[np.ndarray, " parameters"],
+) -> Float[np.ndarray, "... size"]:
+    """Derivatives of values at one state by all entries of z, along the last axis."""
+    steps = STEP * np.eye(len(z))
+    at = np.concatenate([z + share * steps for share in (1.0, -1.0, 2.0, -2.0)])
+    values = function(at, np.repeat(p[None], len(at), axis=0))
+    ahead, behind, twice, back = values.reshape(4, len(z), *values.shape[1:])
+    slope = (8.0 * (ahead - behind) - (twice - back)) / (12.0 * STEP)
+    return np.asarray(np.moveaxis(slope, 0, -1))
+
+
+@dataclass(frozen=True)
+class SprungPoints:
+    """Material points on springs whose places the unknowns leave free."""
+
+    points: MaterialPoints
+    springs: SupportSprings
+
+    def inertia(
+        self, z: Lanes, p: Parameters
+    ) -> Float[np.ndarray, "lanes coordinates coordinates"]:
+        """Mass matrix of the unknowns and the places of the springs."""
+        return self.points.inertia(z, p, self.springs)
