@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from equimorph.charts.arrangement import outline
-from equimorph.charts.regions import count_regions
+from equimorph.charts.regions import count_regions, empty_regions, loop_area
 
 SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
 HALVES = np.array([[0, 1, 2], [0, 2, 3]])
@@ -137,3 +137,16 @@ def test_raster_equals_counting_place_by_place():
     x, y = np.linspace(-0.99, 1.49, 23), np.linspace(-0.98, 0.97, 31)
     places = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
     assert regions.raster(x, y).ravel().tolist() == regions.count(places).tolist()
+
+
+@pytest.mark.parametrize("turn", [0, 1, 2, 3])
+def test_what_covers_half_a_box_leaves_the_other_half_empty(turn):
+    """The covered half has vertices on three sides, one of them in the middle of a side."""
+    half = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 0.3], [1.0, 0.5], [0.0, 0.5]])
+    for _ in range(turn):
+        half = np.stack([1.0 - half[:, 1], half[:, 0]], axis=1)
+    cells = np.array([[0, 1, 2], [0, 2, 3], [0, 3, 4]])
+    regions = count_regions(half, cells)
+    (loops,) = empty_regions(regions, np.zeros(2), np.ones(2))
+    assert len(loops) == 1
+    assert loop_area(loops[0]) == pytest.approx(0.5, abs=1e-6)

@@ -258,3 +258,20 @@ def test_the_arch_turns_over_in_mujoco(turning):
     assert belief.status == em.ControlStatus.ARRIVED
     assert not plant.snapped
     assert simulated.departure(plant.state) < 0.01
+
+
+def test_routes_have_few_corners():
+    """From one side of a spring to the other, around the cusp at (1, 0): seven straight moves.
+
+    The path over the vertices of the cells has 14; where straight moves between these are safe
+    under all likely loads, what lies between is left out.
+    """
+    box = em.Box(x_l=(0.5, 1.4), F=(-0.4, 0.4))
+    eset = em.equilibrium_set(em.Spring(), box, fixed={"k": 1.0}, intervals=(9, 9), checks=0)
+    angle = eset.structure.angle
+    start, goal = (best(eset.at(x_l=0.7, F=0.0).stable, key=angle) for best in (min, max))
+    careful = em.Controller(eset, goal, {angle: NOISE}, {"k": 0.02}, margin=0.05)
+    belief = careful.start(start)
+    assert belief.status == em.ControlStatus.FOLLOWING
+    assert len(belief.way_points) <= 8
+    assert max(point["x_l"] for point in belief.way_points) > 1.0

@@ -89,3 +89,23 @@ def test_pressure_on_a_chain_has_a_symmetric_stiffness_between_held_ends():
     inner = whole[: linkage.size, : linkage.size][np.ix_(linkage.free, linkage.free)]
     reduced = basis.T @ inner @ basis
     assert np.allclose(reduced, reduced.T, atol=1e-10)
+
+
+def test_units_change_no_entry_of_the_chain_of_a_stretched_rod():
+    """Entries are without dimension: 30 EA L²/B, a pull of 4, and the same in N and mm."""
+    plain = em.Rod(
+        ends=("clamped", "free"), axial=30.0, loads={"P": em.PointForce(1.0, (1.0, 0.0))}
+    )
+    system = {"force": "N", "length": "mm"}
+    unit = 4.0 * np.pi**2 * 2000.0 / 300.0**2
+    sized = em.Rod(
+        ends=("clamped", "free"), axial=30.0 * unit, loads={"P": em.PointForce(1.0, (1.0, 0.0))},
+        EI=2000.0, length=300.0, units=system, mass="1 kg",
+    )  # fmt: skip
+    found = []
+    for rod, force in ((plain, 4.0), (sized, 4.0 * unit)):
+        state = em.lift(rod.natural_state(), {"P": force}).end.state
+        found.append(ChainedRod(rod, 8).entries(state))
+    np.testing.assert_allclose(found[1], found[0], atol=1e-12)
+    linkage = ChainedRod(plain, 8).linkage
+    np.testing.assert_allclose(found[0][linkage.strain_entries], 4.0 / 30.0, rtol=1e-9)

@@ -8,6 +8,7 @@ from hypothesis import Phase, example, given, settings, strategies as st
 
 import equimorph as em
 from equimorph.equilibria import ParameterLine, TraceOptions, trace
+from equimorph.equilibria.determinants import may_vanish
 from equimorph.equilibria.hidden_events import with_hidden_events
 from equimorph.equilibria.trace_options import EventCode
 from oracles.polynomial import Polynomial, slaved
@@ -229,3 +230,17 @@ def test_eigenvalues_of_opposite_signs_that_swap_are_no_event():
     path = em.lift(start, ends[1])
     assert path.arrived
     assert path.states.margin.min() > 1.5
+
+
+@pytest.mark.parametrize("size", [1e-6, 1.0, 1e6])
+def test_a_determinant_is_looked_at_where_its_parabola_has_a_low_bottom_inside(size):
+    """f = b (t − c)² + d on 0 ≤ t ≤ 1, of either sign: at most half as low as the lower end."""
+
+    def parabola(bow, place, least):
+        return bow * (np.array([0.0, 0.5, 1.0]) - place) ** 2 + least
+
+    seen = [parabola(4.0, 0.5, 0.4), parabola(2.0, 0.4, -0.1), parabola(4.0, 0.6, 0.1)]
+    unseen = [parabola(4.0, 0.5, 1.1), parabola(0.02, 13.0, -2.3), parabola(-1.0, 0.5, 1.0)]
+    values = size * np.array([*seen, *unseen]).T
+    assert may_vanish(values).tolist() == [True] * 3 + [False] * 3
+    assert may_vanish(-values).tolist() == [True] * 3 + [False] * 3

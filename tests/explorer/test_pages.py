@@ -91,6 +91,22 @@ def test_pictures_of_every_structure_are_mean_and_modes(specimen):
     json.dumps(found.layout)
 
 
+def test_pictures_do_not_depend_on_the_unit_of_length():
+    """A rod of 300 mm, and the same of 1: its points, and steps of coefficients, are 300 times."""
+    pages = []
+    for more in (
+        {},
+        {"EI": "2 N mm^2", "length": "300 mm", "units": {"force": "N", "length": "mm"}},
+    ):
+        rod = em.Rod("uniform", **more)
+        states = em.lift(rod.natural_state(Theta=1.0), {"Theta": 0.8}).states
+        pages.append(gallery(states))
+    plain, sized = pages
+    assert sized.size == pytest.approx(300.0 * plain.size)
+    np.testing.assert_allclose(sized.step, 300.0 * plain.step, rtol=1e-6)
+    assert sized.coefficients.shape == plain.coefficients.shape
+
+
 def test_values_are_written_as_toml():
     value = {"a b": [1, 2.5, True, 'x\n"y"'], "c": {"d": np.float64(1e-7)}, "e": None}
     assert tomllib.loads(f"v = {toml(value)}")["v"] == {

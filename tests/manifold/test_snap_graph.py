@@ -85,3 +85,13 @@ def test_wrong_questions_about_snaps_are_refused(spring_set):
     graph = snap_graph(spring_set, samples=2)
     with pytest.raises(InputError, match=r"`stratum` must be a stable one \(0\); got 1"):
         graph.leaving(1)
+
+
+def test_surfaces_of_folds_have_no_order_along_them():
+    """Over three parameters a run is those vertices alone that were tried."""
+    eset = lifted(Spring(), Box(x_l=(0.6, 0.8), F=(-0.3, 0.3), k=(0.8, 1.2)), intervals=(2, 5, 2))
+    snaps = snap_graph(eset, samples=6).snaps
+    assert len(snaps) == 2
+    for snap in snaps:
+        assert len(snap.vertices) > 1
+        np.testing.assert_array_equal(snap.along, snap.vertices)
