@@ -79,3 +79,11 @@ def test_margin_at_the_boundary_of_stability_is_zero(x_l):
     delta = np.arccos(x_l ** (1 / 3))
     fold = States(Spring(), np.array([[delta]]), np.array([[x_l, np.sin(delta) ** 3, 1.0]]))
     assert fold.margin[0] == pytest.approx(0.0, abs=1e-11)
+
+
+def test_the_force_of_inertia_is_that_of_a_mass_that_moves_along_a_line():
+    """T = ½ m x_l² sec⁴δ δ̇², so that Γ = ½ M' δ̇² = 2 m x_l² sec⁴δ tan δ δ̇²."""
+    spring, x, delta = Spring(mass=3.0), 0.8, np.array([[0.4], [-0.7]])
+    p, rate = np.tile([x, 0.1, 1.0], (2, 1)), np.array([[1.3], [0.5]])
+    expected = 2.0 * 3.0 * x**2 * np.tan(delta) / np.cos(delta) ** 4 * rate**2
+    np.testing.assert_allclose(spring.inertial_force(delta, p, rate), expected, rtol=1e-7)
