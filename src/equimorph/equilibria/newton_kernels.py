@@ -3,7 +3,9 @@
 import numpy as np
 
 from equimorph.linalg.compiled import njit
-from equimorph.linalg.kernels import FLAGS, INNER
+from equimorph.linalg.dense_kernels import solve_by_rows
+from equimorph.linalg.kernels import FLAGS
+from equimorph.linalg.row_kernels import copy_row
 from equimorph.structures.newton_kernels import SINGULAR, UNFINISHED, stand_after
 
 DEPENDENT = 1e-14
@@ -46,7 +48,9 @@ def move_lanes(z, p, beta, change, directions, share, new_z, new_p, new_beta):
     size, (k, parameters) = z.shape[1], directions.shape[1:]
     for lane in range(z.shape[0]):
         part = share[lane]
-        new_z[lane], new_p[lane], new_beta[lane] = z[lane], p[lane], beta[lane]
+        copy_row(z, lane, new_z, lane)
+        copy_row(p, lane, new_p, lane)
+        new_beta[lane] = beta[lane]
         if part == 0.0:
             continue
         for i in range(size):
@@ -71,7 +75,7 @@ def amount_lanes(slopes, value, amount, regular):
                 matrix[i, j] = slopes[lane, i, j]
                 size = max(size, abs(matrix[i, j]))
             matrix[i, k] = -value[lane, i]
-        determinant = _solve_small(matrix)
+        determinant = solve_by_rows(matrix, k)
         regular[lane] = abs(determinant) > DEPENDENT * size**k
         for i in range(k):
             amount[lane, i] = matrix[i, k] if regular[lane] else np.nan
@@ -98,7 +102,7 @@ def null_lanes(x, size, k, b, null):
                 matrix[k, j] += b[lane, n] * x[lane, at, n]
         matrix[:, k + 1] = 0.0
         matrix[k, k + 1] = 1.0
-        _solve_small(matrix)
+        solve_by_rows(matrix, k + 1)
         null[lane] = 0.0
         for j in range(k + 1):
             at, share = last if j == k else j, matrix[j, k + 1]
@@ -106,28 +110,3 @@ def null_lanes(x, size, k, b, null):
             for n in range(size):
                 null[lane, n] += share * x[lane, at, n]
             null[lane, size] += share * beta
-
-
-@njit(**INNER)
-def _solve_small(a):
-    """Gauss with partial pivoting on (n, n + 1), the right-hand side last; the determinant."""
-    n, determinant = a.shape[0], 1.0
-    for k in range(n):
-        best = k
-        for i in range(k + 1, n):
-            if abs(a[i, k]) > abs(a[best, k]):
-                best = i
-        if best != k:
-            determinant = -determinant
-            for j in range(k, n + 1):
-                a[k, j], a[best, j] = a[best, j], a[k, j]
-        determinant *= a[k, k]
-        for i in range(k + 1, n):
-            factor = a[i, k] / a[k, k]
-            for j in range(k + 1, n + 1):
-                a[i, j] -= factor * a[k, j]
-    for k in range(n - 1, -1, -1):
-        for j in range(k + 1, n):
-            a[k, n] -= a[k, j] * a[j, n]
-        a[k, n] /= a[k, k]
-    return determinant

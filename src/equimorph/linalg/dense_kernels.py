@@ -3,10 +3,7 @@
 import numpy as np
 
 from equimorph.linalg.compiled import njit
-
-FLAGS = {"nogil": True, "error_model": "numpy", "fastmath": {"contract"}}
-INNER = {**FLAGS, "_nrt": False}
-"""Flags of kernels that are called by kernels and allocate nothing."""
+from equimorph.linalg.kernels import FLAGS, INNER, exchange
 
 
 @njit(**FLAGS)
@@ -17,27 +14,32 @@ def solve_dense(systems, size, symmetric, x, negative, determinant):
     """
     for lane in range(systems.shape[0]):
         negative[lane], determinant[lane] = _factor_by_rooks(symmetric[lane])
-        _solve_by_rows(systems[lane], size)
+        solve_by_rows(systems[lane], size)
         for side in range(x.shape[1]):
             for i in range(size):
                 x[lane, side, i] = systems[lane, i, size + side]
 
 
 @njit(**INNER)
-def _solve_by_rows(a, size):
-    """Gauss with partial pivoting, right-hand sides last; no numbers where a pivot vanishes."""
-    width = a.shape[1]
+def solve_by_rows(a, size):
+    """Gauss with partial pivoting, right-hand sides last; the determinant.
+
+    No numbers where a pivot vanishes.
+    """
+    width, determinant = a.shape[1], 1.0
     for k in range(size):
         best = k
         for i in range(k + 1, size):
             if abs(a[i, k]) > abs(a[best, k]):
                 best = i
         if best != k:
+            determinant = -determinant
             for j in range(k, width):
                 a[k, j], a[best, j] = a[best, j], a[k, j]
         if a[k, k] == 0.0:
             a[:, size:] = np.nan
-            return
+            return 0.0
+        determinant *= a[k, k]
         inverse = 1.0 / a[k, k]
         for i in range(k + 1, size):
             factor = a[i, k] * inverse
@@ -51,6 +53,7 @@ def _solve_by_rows(a, size):
                 a[k, j] -= factor * a[i, j]
         for j in range(size, width):
             a[k, j] /= a[k, k]
+    return determinant
 
 
 @njit(**INNER)
@@ -79,7 +82,7 @@ def _factor_by_rooks(a):
             else:
                 first, second, off, r = r, r, other, s
         if single:
-            _exchange(a, k, first)
+            exchange(a, k, first)
             pivot = a[k, k]
             if pivot == 0.0:  # its row is zero, too
                 product, k = 0.0, k + 1
@@ -93,8 +96,8 @@ def _factor_by_rooks(a):
                         a[i, j] -= factor * a[k, j]
             k += 1
         else:
-            _exchange(a, k, min(first, second))
-            _exchange(a, k + 1, max(first, second))
+            exchange(a, k, min(first, second))
+            exchange(a, k + 1, max(first, second))
             b = a[k + 1, k]
             p, q = a[k, k] / b, a[k + 1, k + 1] / b
             shape = p * q - 1.0
@@ -119,13 +122,3 @@ def _largest_beside(a, row, start):
         if j != row and abs(a[row, j]) > largest:
             largest, place = abs(a[row, j]), j
     return largest, place
-
-
-@njit(**INNER)
-def _exchange(a, i, j):
-    """Exchange rows and columns i and j of a symmetric matrix."""
-    if i != j:
-        for c in range(a.shape[0]):
-            a[i, c], a[j, c] = a[j, c], a[i, c]
-        for c in range(a.shape[0]):
-            a[c, i], a[c, j] = a[c, j], a[c, i]

@@ -75,7 +75,7 @@ def factor_symmetric(a):
         if max(diagonal, off) == 0.0:
             return negative, 0.0
         if diagonal >= alpha * off:
-            _swap(a, k, d)
+            exchange(a, k, d)
             pivot = a[k, k]
             negative += pivot < 0.0
             product *= pivot
@@ -88,8 +88,8 @@ def factor_symmetric(a):
                     a[j, i] = a[i, j]
             k += 1
         else:
-            _swap(a, k, s)
-            _swap(a, k + 1, r)
+            exchange(a, k, s)
+            exchange(a, k + 1, r)
             negative += 1
             p, q, b = a[k, k], a[k + 1, k + 1], a[k + 1, k]
             determinant = p * q - b * b
@@ -107,7 +107,7 @@ def factor_symmetric(a):
 
 
 @njit(**INNER)
-def _swap(a, i, j):
+def exchange(a, i, j):
     """Exchange rows and columns i and j of a symmetric matrix."""
     if i != j:
         for c in range(a.shape[0]):

@@ -4,6 +4,7 @@ import numpy as np
 
 from equimorph.linalg.compiled import njit
 from equimorph.linalg.kernels import FLAGS, INNER
+from equimorph.linalg.row_kernels import copy_row
 from equimorph.linalg.simd import LANES
 
 OPEN, FOUND, UNFINISHED, SINGULAR, TOO_LONG, NOT_SHRINKING = range(-1, 5)
@@ -95,7 +96,10 @@ def correct_lanes(step, work, count, result, guards, weights, limits, longest, r
     if left:
         # structures compute whole blocks of lanes: the rest of one goes with the first lane
         for i in range(left, min(len(z), LANES)):
-            z[i], p[i], corner[i] = z[0], p[0], corner[0]
+            copy_row(z, 0, z, i)
+            copy_row(p, 0, p, i)
+            corner[i] = corner[0]
             if along:
-                dp[i], row[i] = dp[0], row[0]
+                copy_row(dp, 0, dp, i)
+                copy_row(row, 0, row, i)
     return left

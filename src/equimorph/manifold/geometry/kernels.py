@@ -3,6 +3,7 @@
 import numpy as np
 
 from equimorph.linalg.compiled import njit
+from equimorph.linalg.row_kernels import rows_with_room, with_room
 
 
 @njit(nogil=True)
@@ -217,9 +218,9 @@ def cut_rows(rows, edges, base):
         following[e], head[low] = head[low], e
     count, corners = rows.shape
     room = count + 4 * edges.shape[0] + 16
-    out, owner = np.empty((room, corners), np.int64), np.empty(room, np.int64)
-    out[:count], owner[:count] = rows, np.arange(count)
-    active = np.arange(count)
+    out, owner, active = rows_with_room(rows, room), np.empty(room, np.int64), np.arange(count)
+    for i in range(count):
+        owner[i] = i
     while active.shape[0] > 0:
         cut, start = 0, count
         for i in range(active.shape[0]):
@@ -227,11 +228,8 @@ def cut_rows(rows, edges, base):
             which = _first_edge(out[row], edges, head, following)
             if which < 0:
                 continue
-            if count == room:
-                room *= 2
-                wider, more = np.empty((room, corners), np.int64), np.empty(room, np.int64)
-                wider[:count], more[:count] = out, owner
-                out, owner = wider, more
+            if count == out.shape[0]:
+                out, owner = rows_with_room(out, count + 1), with_room(owner, count + 1)
             for k in range(corners):
                 vertex = out[row, k]
                 out[count, k] = base + which if vertex == edges[which, 0] else vertex
@@ -241,7 +239,8 @@ def cut_rows(rows, edges, base):
             count += 1
             cut += 1
         again = np.empty(2 * cut, np.int64)
-        again[:cut], again[cut:] = active[:cut], np.arange(start, count)
+        for i in range(cut):
+            again[i], again[cut + i] = active[i], start + i
         active = again
     return out[:count], owner[:count]
 

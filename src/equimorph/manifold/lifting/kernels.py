@@ -3,6 +3,7 @@
 import numpy as np
 
 from equimorph.linalg.compiled import njit
+from equimorph.linalg.row_kernels import rows_with_room, with_room
 from equimorph.manifold.geometry.kernels import nearest_in_list
 
 
@@ -136,9 +137,8 @@ def find_plain_loops(
             c = _straight_across(a, sides[t, 2], mesh, known)
             if b >= 0 and c >= 0 and _straight_across(b, sides[t, 1], mesh, known) == c:
                 if count == loops.shape[0]:
-                    more = np.empty((2 * count, 3), np.int64)
-                    more[:count] = loops
-                    loops, owners = more, _with_room(owners, 2 * count)
+                    loops = rows_with_room(loops, 2 * count)
+                    owners = with_room(owners, 2 * count)
                 loops[count, 0], loops[count, 1], loops[count, 2] = a, b, c
                 owners[count] = t
                 count += 1
@@ -206,9 +206,9 @@ def close_loops(
                     )
                     broken[i] |= state == BROKEN
                     firsts, owners, opens = (
-                        _with_room(firsts, count + 2),
-                        _with_room(owners, count + 1),
-                        _with_room(opens, count + 1),
+                        with_room(firsts, count + 2),
+                        with_room(owners, count + 1),
+                        with_room(opens, count + 1),
                     )
                     firsts[count], owners[count], opens[count] = used, t, state == OPEN
                     count, used = count + 1, stop
@@ -225,16 +225,6 @@ LONGEST_WALK = 64
 
 
 @njit(nogil=True)
-def _with_room(array, size):
-    """The array, or a longer copy, with room for so many entries."""
-    if size <= array.shape[0]:
-        return array
-    out = np.empty(max(size, 2 * array.shape[0]), array.dtype)
-    out[: array.shape[0]] = array
-    return out
-
-
-@njit(nogil=True)
 def _points_over(corners, head, following, plain):
     """Points over the corners of a triangle, sorted, and over which; none of its plain loops."""
     points, where = np.empty(16, np.int64), np.empty(16, np.int64)
@@ -246,7 +236,7 @@ def _points_over(corners, head, following, plain):
             for row in range(plain.shape[0]):
                 known |= plain[row, k] == node
             if not known:
-                points, where = _with_room(points, count + 1), _with_room(where, count + 1)
+                points, where = with_room(points, count + 1), with_room(where, count + 1)
                 at = count
                 while at > 0 and points[at - 1] > node:
                     points[at], where[at] = points[at - 1], where[at - 1]
@@ -294,7 +284,7 @@ def _walk(t, j, came_by, todo, corners, done, mesh, known, inner, points, used):
         points, stop = _append(points, stop, curve, False, inner)
     way = 1 if came_by == 0 else 0
     while True:
-        points = _with_room(points, stop + 1)
+        points = with_room(points, stop + 1)
         points[stop] = visited[count] = point
         stop, count = stop + 1, count + 1
         for k in range(todo.shape[0]):
@@ -336,7 +326,7 @@ def _append(points, stop, curve, forward, inner):
     """Append the inner points of a curve."""
     first, own = inner
     count = first[curve + 1] - first[curve]
-    points = _with_room(points, stop + count)
+    points = with_room(points, stop + count)
     for k in range(count):
         points[stop + k] = own[first[curve] + k if forward else first[curve + 1] - 1 - k]
     return points, stop + count

@@ -23,7 +23,8 @@ def cells_by_bin(first, last, counts):
     starts, place = np.zeros(bins + 1, np.int64), np.empty(d, np.int64)
     for fill in range(2):
         if fill:
-            starts[1:] = np.cumsum(starts[1:])
+            for number in range(bins):
+                starts[number + 1] += starts[number]
             found, free = np.empty(starts[bins], np.int64), starts[:-1].copy()
         for c in range(cells):
             number = 0

@@ -3,6 +3,7 @@
 import numpy as np
 
 from equimorph.linalg.compiled import njit
+from equimorph.linalg.row_kernels import with_room
 from equimorph.manifold.geometry.kernels import sort_sides
 
 
@@ -167,9 +168,9 @@ def flip_edges(cells, squared, index, sense, facets, place, rows, flat, pairs, l
             new, edges = edges, edges + 1
             if new == upper.shape[0]:
                 upper, following, counts = (
-                    _with_room(upper),
-                    _with_room(following),
-                    _with_room(counts),
+                    with_room(upper, new + 1),
+                    with_room(following, new + 1),
+                    with_room(counts, new + 1),
                 )
             low = min(c, d)
             upper[new], following[new], head[low] = max(c, d), head[low], new
@@ -199,10 +200,3 @@ def _corner_apart(cells, t, a, b):
         if cells[t, k] != a and cells[t, k] != b:
             return k
     return 2
-
-
-@njit(nogil=True)
-def _with_room(array):
-    wider = np.empty(2 * array.shape[0] + 16, array.dtype)
-    wider[: array.shape[0]] = array
-    return wider

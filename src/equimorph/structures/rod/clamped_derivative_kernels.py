@@ -123,11 +123,15 @@ def linearise_lanes(
     """F, F_p·d for each of the directions (lanes, k, 4), and the matrix of every lane, in turn."""
     residual_lanes(stiffness, weights, loads, z, p, residual, np.empty((len(z), 3)))
     matrix_lanes(weights, loads, z, p, np.zeros(len(z)), diagonal, border)
-    column = np.empty_like(z)
+    column, dp = np.empty(z.shape), np.empty(p.shape)
     for i in range(directions.shape[1]):
-        dp = np.ascontiguousarray(directions[:, i])
+        for lane in range(len(z)):
+            for j in range(p.shape[1]):
+                dp[lane, j] = directions[lane, i, j]
         parameter_lanes(stiffness, weights, loads, z, p, dp, column)
-        columns[:, i] = column
+        for lane in range(len(z)):
+            for j in range(z.shape[1]):
+                columns[lane, i, j] = column[lane, j]
 
 
 @njit(**FLAGS)

@@ -8,6 +8,7 @@ import numpy as np
 
 from equimorph.linalg.compiled import njit
 from equimorph.linalg.kernels import FLAGS, INNER
+from equimorph.linalg.row_kernels import copy_row
 
 
 @njit(**INNER)
@@ -64,7 +65,8 @@ def eliminate_lengths(
     basis, mixed, right = np.empty((4, 4)), np.empty(3), np.empty(sides)
     left, below = np.empty(borders), np.empty(borders)
     for lane in range(len(z)):
-        small_corner[lane] = corner[lane]
+        for a in range(borders):
+            copy_row(corner[lane], a, small_corner[lane], a)
         _copy_rest(free, size, columns[lane], small_columns[lane])
         _copy_rest(free, size, rows[lane], small_rows[lane])
         _copy_rest(free, size + borders, rhs[lane], small_rhs[lane])

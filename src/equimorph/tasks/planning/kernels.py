@@ -3,6 +3,7 @@
 import numpy as np
 
 from equimorph.linalg.compiled import njit
+from equimorph.linalg.row_kernels import copy_row, rows_with_room, with_room
 
 
 @njit(nogil=True)
@@ -21,17 +22,18 @@ def search_classes(starts, others, costs, changes, ends, limits):
     head, following = np.full(starts.shape[0] - 1, -1), np.empty(1024, np.int64)
     visits = np.zeros(starts.shape[0] - 1, np.int64)
     found, count = np.empty(limits[0], np.int64), 0
-    key[0], what[0], size = 0.0, np.array([ends[0], 0, -1]), 1
+    key[0], what[0, 0], what[0, 1], what[0, 2], size = 0.0, ends[0], 0, -1, 1
     while size > 0 and count < limits[0]:
         cost, node, own, parent = key[0], what[0, 0], what[0, 1], what[0, 2]
         size -= 1
-        key[0], what[0] = key[size], what[size]
+        key[0] = key[size]
+        copy_row(what, size, what, 0)
         _sift_down(key, what, classes, size)
         if visits[node] >= limits[1] or _is_done(head, following, labels, node, own):
             continue
         visits[node] += 1
         if made == labels.shape[0]:
-            labels, following = _grown_rows(labels), _grown_row(following)
+            labels, following = rows_with_room(labels, made + 1), with_room(following, made + 1)
         labels[made, 0], labels[made, 1], labels[made, 2] = node, own, parent
         following[made], head[node] = head[node], made
         made += 1
@@ -41,7 +43,7 @@ def search_classes(starts, others, costs, changes, ends, limits):
             continue
         for link in range(starts[node], starts[node + 1]):
             if known == classes.shape[0]:
-                classes = _grown_rows(classes)
+                classes = rows_with_room(classes, known + 1)
             there = _class_after(classes, known, own, changes[link], limits[2])
             if there < 0:
                 continue
@@ -49,9 +51,7 @@ def search_classes(starts, others, costs, changes, ends, limits):
             if _is_done(head, following, labels, others[link], there):
                 continue
             if size == key.shape[0]:
-                wider = np.empty(2 * size)
-                wider[:size] = key
-                key, what = wider, _grown_rows(what)
+                key, what = with_room(key, size + 1), rows_with_room(what, size + 1)
             key[size] = cost + costs[link]
             what[size, 0], what[size, 1], what[size, 2] = others[link], there, made - 1
             size += 1
@@ -137,19 +137,3 @@ def _sift_down(key, what, classes, size):
             return
         _exchange(key, what, place, least)
         place = least
-
-
-@njit(nogil=True)
-def _grown_rows(rows):
-    """Rows with room for twice as many."""
-    out = np.empty((2 * rows.shape[0], rows.shape[1]), rows.dtype)
-    out[: rows.shape[0]] = rows
-    return out
-
-
-@njit(nogil=True)
-def _grown_row(row):
-    """Numbers with room for twice as many."""
-    out = np.empty(2 * row.shape[0], row.dtype)
-    out[: row.shape[0]] = row
-    return out
