@@ -56,6 +56,10 @@ MENDED = 8
 HOPELESS = 50
 """Stop bisecting once more than 50 cells, and 4× the initial number, are undecided."""
 
+ROOM = 3.0
+"""Default `room` of a set, see `Effort`: a truss with 220 states over a point needed 2.7 times what
+was over its grid, and has no more than 66 003 equilibria."""
+
 
 @check_arguments
 def equilibrium_set(  # noqa: PLR0913  # the knobs of the public face, most by keyword
@@ -108,7 +112,7 @@ def equilibrium_set(  # noqa: PLR0913  # the knobs of the public face, most by k
     limit
         Largest number of equilibria over the grid. Beyond it lifting stops, the set holds what is
         known by then, and its audit reports it (`stopped`). Default: 60 000, or 30 per grid point
-        if that is more.
+        if that is more; cells that are divided may bring up to three times what was there before.
     tiles
         Numbers of parts along each parameter into which the grid is cut: edges are lifted and cells
         closed in each part by itself, and glued. The set is the same, up to the order of its
@@ -136,7 +140,8 @@ def equilibrium_set(  # noqa: PLR0913  # the knobs of the public face, most by k
     progress = progress or Silent()
     intervals = intervals_of(box, intervals)
     counts = tiles_of(intervals, tiles)
-    effort = Effort(seed, checks, accuracy, limit_of(intervals, limit), counts)
+    room = ROOM if limit is None else 0.0
+    effort = Effort(seed, checks, accuracy, limit_of(intervals, limit), counts, room)
     setting = setting_of(structure, box, fixed or {}, tuple(within))
     known = dict(fixed or {})
     order = _Order(setting, box, known, effort, progress, journal, workers)
@@ -245,6 +250,7 @@ class _Lifting:
         rounds = BISECTIONS[pairing.mesh.dimension]
         for number in range(rounds):
             cells = self._lift_cells(self.tiles if number == 0 else None)
+            self._make_room()
             doubtful = cells.doubtful
             first = doubtful if number == 0 else first
             # along a line where the set is singular doubt only multiplies; elsewhere it vanishes
@@ -260,6 +266,12 @@ class _Lifting:
             chosen = np.concatenate([np.array(list(exits), int), np.setdiff1d(chosen, list(exits))])
             pairing.use_mesh(bisect(pairing.mesh, chosen, exits))
         return cells, bisected
+
+    def _make_room(self) -> None:
+        """Let cells be divided over a grid with many equilibria, all of which are lifted."""
+        pairing, effort = self.pairing, self.order.effort
+        if pairing.limit == effort.limit and not pairing.is_full:
+            pairing.limit = max(pairing.limit, int(effort.room * pairing.points.count))
 
     def _lift_cells(self, tiles: TileRounds | None) -> Cells:
         """Flood and close all cells, in tiles if there are such."""

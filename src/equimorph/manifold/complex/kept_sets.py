@@ -38,13 +38,18 @@ from equimorph.structures import States, Structure
 
 @dataclass(frozen=True)
 class Effort:
-    """How thoroughly a set is lifted; see `equilibrium_set`."""
+    """How thoroughly a set is lifted; see `equilibrium_set`.
+
+    room: how many times the equilibria over the undivided grid bisection may bring, if that is more
+    than the limit.
+    """
 
     seed: int
     checks: int
     accuracy: float | None
     limit: int
     tiles: tuple[int, ...] | None = None
+    room: float = 0.0
 
 
 def question_of_set(setting: Setting, box: Box, intervals: tuple[int, ...], effort: Effort) -> str:

@@ -227,7 +227,8 @@ def facing_folds(pairing: Pairing, chords: FoldChords) -> Facing:
     place = points.p[ends][:, :, free].mean(axis=1)
     place[: len(bent)] = _meetings(pairing, chords.take(bent))
     shares = shares_in(corners, place)
-    starts = Starts(chords.triangle[one], corners, shares, points.z[ends].mean(axis=1))
+    z = points.z[ends].mean(axis=1)
+    starts = Starts.between(pairing, chords.triangle[one], shares, z, ends)
     near = np.asarray((shares > NEAR).all(axis=1))
     return Facing(one[near], other[near], starts.take(near))
 

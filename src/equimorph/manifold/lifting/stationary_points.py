@@ -19,7 +19,7 @@ from equimorph.linalg.lanes import over_lanes
 from equimorph.manifold.geometry.crossings import Reduction, reduction
 from equimorph.manifold.geometry.points import Points
 from equimorph.manifold.geometry.quadratics import least_in_simplex, monomials
-from equimorph.manifold.geometry.setting import Setting
+from equimorph.manifold.geometry.setting import Setting, embed
 from equimorph.manifold.geometry.topology import keys_of
 from equimorph.manifold.lifting.cells import Cells
 from equimorph.manifold.lifting.kernels import slope_squares, square_gaps
@@ -38,7 +38,12 @@ valley, along which no stationary point is sought."""
 OUTSIDE = -0.02
 """Barycentric coordinate down to which a point counts as inside its cell."""
 FARTHEST = 2.0
-"""Barycentric coordinate beyond which Newton's method is given up: the point is elsewhere."""
+"""Barycentric coordinate, and distance relative to that of the points around the guess, beyond
+which Newton's method is given up: the point is elsewhere, or on other sheets."""
+
+
+Corners = Int[np.ndarray, "n corners"]
+Shares = Float[np.ndarray, "n corners"]
 
 
 @dataclass(frozen=True)
@@ -46,13 +51,29 @@ class Starts(Columns):
     """Guesses in grid cells.
 
     cell: grid cells; corners: of these, in free parameters; shares: barycentric coordinates of the
-    guesses; z: states there, between the two sheets.
+    guesses; z: states there, between the two sheets; reach: distance to the farthest of the points
+    of these sheets from which they were made.
     """
 
     cell: Some
     corners: Float[np.ndarray, "n corners d"]
-    shares: Float[np.ndarray, "n corners"]
+    shares: Shares
     z: Lanes
+    reach: Values
+
+    @classmethod
+    def between(
+        cls, pairing: Pairing, cell: Some, shares: Shares, z: Lanes, points: Int[np.ndarray, "n k"]
+    ) -> "Starts":
+        """Guesses between some points each."""
+        mesh, setting, store = pairing.mesh, pairing.setting, pairing.points
+        corners = mesh.vertices[mesh.cells[cell]]
+        place = embed(setting, z, setting.parameters(np.einsum("nc,ncd->nd", shares, corners)))
+        reach = np.zeros(len(cell))
+        for own in points.T:
+            gap = np.linalg.norm(embed(setting, store.z[own], store.p[own]) - place, axis=1)
+            np.maximum(reach, gap, out=reach)
+        return cls(cell, corners, shares, z, reach)
 
 
 @dataclass(frozen=True)
@@ -95,7 +116,7 @@ def stationary_points(setting: Setting, starts: Starts, *, saddles: bool) -> Sta
     edges[:, :, setting.free] = starts.corners[:, 1:] - starts.corners[:, :1]
     z, shares = starts.z.copy(), starts.shares.copy()
     p = setting.parameters(np.einsum("nc,ncd->nd", shares, starts.corners))
-    b = null_border(structure, z, p)
+    b, start = null_border(structure, z, p), embed(setting, z, p)
     squared, lanes = np.full(count, np.nan), np.arange(count)
     ended, lost, pointed = np.zeros((3, count), bool)
     for _ in range(ITERATIONS):
@@ -106,8 +127,10 @@ def stationary_points(setting: Setting, starts: Starts, *, saddles: bool) -> Sta
         shares[lanes, 1:] += step[:, 1:]
         shares[lanes, 0] -= step[:, 1:].sum(axis=1)
         length = np.linalg.norm(step[:, 1:], axis=1)
-        ended[lanes] = length < CONVERGED
-        going = (length >= CONVERGED) & (np.abs(shares[lanes]).max(axis=1) < FARTHEST)
+        away = np.linalg.norm(embed(setting, z[lanes], p[lanes]) - start[lanes], axis=1)
+        near = away < FARTHEST * starts.reach[lanes]
+        ended[lanes] = near & (length < CONVERGED)
+        going = near & (length >= CONVERGED) & (np.abs(shares[lanes]).max(axis=1) < FARTHEST)
         lanes = lanes[going & np.isfinite(squared[lanes])]
         if len(lanes) == 0:
             break
@@ -179,9 +202,6 @@ not approach each other."""
 MOST = 0.5
 """Share of the cells that must be looked at for their surroundings to tell."""
 
-Corners = Int[np.ndarray, "n corners"]
-Shares = Float[np.ndarray, "n corners"]
-
 
 @dataclass(frozen=True)
 class _Pairs(Columns):
@@ -202,8 +222,9 @@ def approaches(pairing: Pairing, cells: Cells, wanted: Flags) -> Starts:
     deep = np.flatnonzero(ratio < DEEP)
     pairs, shares = pairs.take(deep), shares[deep]
     middle = 0.5 * (pairing.points.z[pairs.one] + pairing.points.z[pairs.other])
-    corners = pairing.mesh.vertices[pairing.mesh.cells[pairs.cell]]
-    return Starts(pairs.cell, corners, shares, np.einsum("nc,nci->ni", shares, middle))
+    z = np.einsum("nc,nci->ni", shares, middle)
+    both = np.concatenate([pairs.one, pairs.other], axis=1)
+    return Starts.between(pairing, pairs.cell, shares, z, both)
 
 
 @dataclass(frozen=True)
