@@ -32,9 +32,16 @@ CONVERGED = 1e-10
 FEASIBLE = 1e-7
 """Relative excess over a bound with which a point counts as obeying it."""
 
+ON_SIDE = 1e-9
+"""Distance from a side of a box, relative to its width, of points that lie on it."""
+
+# Effort: how far searches over a set go at a time, and when they end.
+LONGEST_STEP = 0.3
+"""Longest step in the metric."""
+LAST_STEP = 1e-9
+"""Length in the metric of a step that is the last."""
+
 # Difference: steps of finite differences.
-CENTRAL_DIFFERENCE = 1e-6
-"""Step of central differences, in units of the scales of what varies."""
 METRIC_DIFFERENCE = 1e-5
 """Step of central differences along curves and tangents of the set, in the metric: their error and
 that of round-off are about 1e-11."""

@@ -30,6 +30,21 @@ def test_barriers_are_thick_and_gaps_hatched(spring_set):
     assert "////" in hatches
 
 
+def test_the_frame_leaves_the_same_share_free_on_all_sides(spring_set):
+    """4 % of the box around a reduction, and of the angles that a chart by descriptors covers."""
+    spring = spring_set.structure
+    with unchecked():
+        tie = em.reduce(spring_set, prefer=em.charts.lowest(spring.descriptor("energy")))
+        angles = em.DescriptorChart(spring_set, [spring.angle, "x_l"])
+    box = np.stack([spring_set.box.lower, spring_set.box.upper], axis=1)
+    covered = spring.angle(spring_set.points)
+    turned = np.array([[covered.min(), covered.max()], box[0]])
+    for chart, places in ((tie, box), (angles, turned)):
+        ax = chart_domain(chart)
+        room = 0.04 * np.diff(places) * [-1.0, 1.0]
+        np.testing.assert_allclose([ax.get_xlim(), ax.get_ylim()], places + room, atol=1e-9)
+
+
 def test_panels_show_the_set_above_and_every_chart_below(spring_set):
     angle = spring_set.structure.angle
     with unchecked():

@@ -10,6 +10,7 @@ from scipy.spatial import cKDTree
 from equimorph.arrays import Bool, Float, Int, Pairs
 from equimorph.charts.kernels import overlap_flags
 from equimorph.charts.location import Cells
+from equimorph.linalg.graphs import graph_of
 from equimorph.manifold.geometry.topology import labels
 from equimorph.manifold.lookup.cell_index import CellIndex
 
@@ -112,8 +113,8 @@ def _split(
         which = group[pairs[own[0], 0]]
         mine = pairs[own[group[pairs[own, 0]] == which]]
         inner = links[(group[links] == which).all(axis=1)]
-        length = np.linalg.norm(middle[inner[:, 0]] - middle[inner[:, 1]], axis=1) + 1e-12
-        graph = coo_array((length, inner.T), shape=(len(group), len(group))).tocsr()
+        length = np.linalg.norm(middle[inner[:, 0]] - middle[inner[:, 1]], axis=1)
+        graph = graph_of(len(group), inner, length)
         some = mine[np.linspace(0, len(mine) - 1, min(len(mine), 16)).astype(int)]
         far = dijkstra(graph, directed=False, indices=some[:, 0])
         apart = far[np.arange(len(some)), some[:, 1]]

@@ -38,6 +38,7 @@ from equimorph.manifold.geometry.topology import (
     facets_of,
     flags_of,
     orientation,
+    runs,
 )
 from equimorph.manifold.lookup.cell_index import CellIndex, Hits
 from equimorph.manifold.lookup.exact_states import root_weights
@@ -206,7 +207,7 @@ class Cells:
             for side in ("left", "right")
         )
         count = high - low
-        among = order[np.repeat(low - np.cumsum(count) + count, count) + np.arange(count.sum())]
+        among = order[runs(low, count)[1]]
         states = eset.points[vertex[among]]
         point = np.concatenate([away[found.point], np.repeat(own, count)])
         both = Found(

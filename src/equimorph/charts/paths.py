@@ -5,11 +5,10 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import dijkstra
 
 from equimorph.arrays import CellFlags, CellNumbers, Float, Int, VertexFlags
 from equimorph.charts.preparation import first_copies
+from equimorph.linalg.graphs import shortest_path
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.complex.kept_tables import adjacency_of, places_of
 from equimorph.manifold.geometry.points import are_singular, on_fold
@@ -112,17 +111,9 @@ def _over_edges(eset: EquilibriumSet, start: Place, goal: Place) -> list[int] | 
         own = embed(setting, end.state.z[None], end.state.p[None])
         links.append(np.stack([np.full(len(corners), count + number), corners], axis=1))
         lengths.append(np.linalg.norm(place[corners] - own, axis=1))
-    joined = np.concatenate(links)
-    graph = coo_array(
-        (np.maximum(np.concatenate(lengths), 1e-12), joined.T), shape=(count + 2,) * 2
-    ).tocsr()
-    far, before = dijkstra(graph, directed=False, indices=count, return_predecessors=True)
-    if not np.isfinite(far[count + 1]):
-        return None
-    path = [int(before[count + 1])]
-    while before[path[-1]] != count:
-        path.append(int(before[path[-1]]))
-    return path[::-1]
+    ends = (count, count + 1)
+    path = shortest_path(count + 2, np.concatenate(links), np.concatenate(lengths), ends)
+    return None if path is None else path[1:-1].tolist()
 
 
 def _at_end(eset: EquilibriumSet) -> VertexFlags:

@@ -7,6 +7,7 @@ import numpy as np
 
 from equimorph.arrays import Flags, Float, Int, Parameters, Some, Values
 from equimorph.equilibria.soft_modes import metric_length
+from equimorph.manifold.geometry.topology import runs
 from equimorph.model import position
 from equimorph.structures import States, Structure, join_states
 from equimorph.tasks.planning.network import MATCH, Demands, lift_straight
@@ -129,8 +130,7 @@ class LikelyLoads:
         bears = np.ones(len(source), bool)
         if not between.any():
             return bears
-        move = np.repeat(np.arange(len(source)), between)
-        number = 1 + np.arange(len(move)) - np.repeat(np.cumsum(between) - between, between)
+        move, number = runs(np.ones_like(between), between)
         share = number / (between[move] + 1)
         moving = np.flatnonzero((change != 0.0).any(axis=0))
         to = (source.p[move] + share[:, None] * change[move])[:, moving]

@@ -8,6 +8,7 @@ import numpy as np
 from equimorph.arrays import Int, Some, Values
 from equimorph.control.likely_loads import REACH, Bundles, LikelyLoads, move_states, positions
 from equimorph.equilibria import TraceOptions
+from equimorph.linalg.graphs import shortest_path
 from equimorph.manifold import EquilibriumSet, equilibrium_set
 from equimorph.manifold.complex.kept_tables import from_cache
 from equimorph.manifold.geometry.topology import labels
@@ -17,7 +18,6 @@ from equimorph.tasks.planning.network import (
     Pairs,
     connect,
     network_of,
-    shortest_path,
     vertices_around,
 )
 from equimorph.tasks.planning.objectives import objective_of

@@ -11,14 +11,14 @@ from enum import StrEnum
 from itertools import pairwise
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components, csgraph_from_dense, dijkstra
+from scipy.sparse.csgraph import csgraph_from_dense, dijkstra
 
 from equimorph.arrays import Float, Int, Items, Lanes
 from equimorph.equilibria.descents import descend
 from equimorph.equilibria.gradient_flow import QUICK, Ending, Pace
 from equimorph.equilibria.random_search import PUSHED, Ground, Groups
 from equimorph.equilibria.saddles import Pairs, states_between
+from equimorph.linalg.graphs import components, walk_back
 from equimorph.structures import Growth
 from equimorph.tolerances import SAME_STATE
 
@@ -117,10 +117,7 @@ class MinimaGraph:
     def pieces(self, group: int) -> tuple[Numbers, Numbers]:
         """Stable states over a point, and the number of the piece of the graph of each."""
         joined = [(edge.saddle, edge.end) for edge in self.edges if edge.end != NONE]
-        top, end = np.array(joined, int).reshape(-1, 2).T
-        count = len(self)
-        graph = coo_array((np.ones(len(top)), (top, end)), shape=(count, count))
-        label = connected_components(graph, directed=False)[1]
+        label = components(len(self), np.array(joined, int).reshape(-1, 2))
         minima = np.flatnonzero((self.group == group) & (self.index == 0))
         return minima, np.unique(label[minima], return_inverse=True)[1]
 
@@ -168,10 +165,9 @@ class MinimaGraph:
 
 def _shortest(gaps: Float[np.ndarray, "n n"], before: Items, end: int) -> Pair:
     """Shortest gap on the chain that Dijkstra found to a minimum."""
-    chain = [end]
-    while before[chain[-1]] >= 0:
-        chain.append(int(before[chain[-1]]))
-    links = [(i, j) for i, j in pairwise(chain) if gaps[i, j] > 0.0]
+    chain = walk_back(before, 0, end)
+    assert chain is not None
+    links = [(i, j) for i, j in pairwise(chain[::-1].tolist()) if gaps[i, j] > 0.0]
     return min(links, key=lambda link: float(gaps[link]))
 
 

@@ -348,12 +348,11 @@ def _saddles(field: SetBarriers | None) -> Arrays:
 
 
 def _barriers(reduction: Reduction, extra: _States) -> list[dict[str, Any]]:
-    """Both sides of each barrier, where the sides are known."""
+    """Both sides of each barrier."""
     return [
         {"kind": each.kind, "near": extra.add(each.near), "far": extra.add(each.far),
-         "count": min(len(each.near), len(each.far)), "facets": each.facets.tolist()}
+         "count": len(each.near), "facets": each.facets.tolist()}
         for each in reduction.barriers
-        if len(each.near) and len(each.near) == len(each.far)
     ]  # fmt: skip
 
 

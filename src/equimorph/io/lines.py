@@ -6,8 +6,6 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from equimorph.argument_checks import check_arguments
@@ -15,6 +13,7 @@ from equimorph.argument_kinds import one_of
 from equimorph.arrays import Float, Int
 from equimorph.errors import InputError
 from equimorph.io.formats import Drawing, read_compas, read_dxf, read_ply, read_vtk
+from equimorph.linalg.graphs import components
 from equimorph.model.units import LENGTH, UNITS
 
 SAME_PLACE = 1e-6
@@ -186,8 +185,7 @@ def _join(
     """Joints in the order of the lines, and which two each line joins; each pair once."""
     every = segments.reshape(-1, 3)
     pairs = cKDTree(every).query_pairs(reach, output_type="ndarray")
-    graph = coo_array((np.ones(len(pairs)), pairs.T), shape=(len(every), len(every)))
-    _, group = connected_components(graph, directed=False)
+    group = components(len(every), pairs)
     _, first, group = np.unique(group, return_index=True, return_inverse=True)
     rank = np.argsort(np.argsort(first))
     joint = rank[group]

@@ -79,10 +79,7 @@ def known_calls() -> list[KernelCall]:
 def calls_of(root: object) -> list[KernelCall]:
     """Calls that every study makes, and those of the kernels that an object's parts use.
 
-    Parameters
-    ----------
-    root
-        Any object: the modules that its attributes come from tell.
+    The modules that its attributes come from tell.
     """
     kernels = {
         f"{each.py_func.__module__}.{each.py_func.__name__}"
@@ -128,13 +125,7 @@ def _parts(root: object) -> Iterator[object]:
 
 
 def compile_ahead(calls: Iterable[KernelCall]) -> None:
-    """Compile what is not on disk; processes that do so at the same time share the work.
-
-    Parameters
-    ----------
-    calls
-        Those to be made later.
-    """
+    """Compile what is not on disk; processes that do so at the same time share the work."""
     missing = [each for each in calls if not each.is_kept]
     command = _command(missing)
     helpers = [
@@ -154,10 +145,7 @@ def compile_ahead(calls: Iterable[KernelCall]) -> None:
 def compile_behind(calls: Iterable[KernelCall]) -> None:
     """Let a process that outlives this one compile what is not on disk; do without it meanwhile.
 
-    Parameters
-    ----------
-    calls
-        Of loops.
+    The calls are those of loops.
     """
     missing = [each for each in calls if not each.is_kept]
     if missing:

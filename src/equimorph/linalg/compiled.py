@@ -37,13 +37,7 @@ AWAITED: set[str] = set()
 
 
 def njit(**options: Any) -> Callable[[Any], Any]:
-    """Compile a function when it is first called with arguments of new types, and keep the code.
-
-    Parameters
-    ----------
-    options
-        Those of `numba.njit`.
-    """
+    """Compile a function when it is first called with arguments of new types, and keep the code."""
 
     def compiled(function: Any) -> Any:
         dispatcher = numba.njit(**options)(function)
@@ -62,10 +56,7 @@ def njit(**options: Any) -> Callable[[Any], Any]:
 def template(**options: Any) -> Callable[[Any], Any]:
     """Compile a function as a part of the kernels that give it other kernels as arguments.
 
-    Parameters
-    ----------
-    options
-        Those of `numba.njit`. Only the code of those kernels is kept.
+    Only the code of those kernels is kept.
     """
     return numba.njit(**options)  # type: ignore[no-any-return]
 
@@ -87,24 +78,12 @@ def _alone(dispatcher: Any) -> Callable[[Any], Any]:
 
 
 def kept_signatures(kernel: Any) -> list[Any]:
-    """Types of arguments for which code made from the present sources is on disk.
-
-    Parameters
-    ----------
-    kernel
-        A function that `njit` of this module returned.
-    """
+    """Types of arguments for which code of a kernel from the present sources is on disk."""
     return [key[0] for key in kernel._cache._cache_file._load_index()]
 
 
 def is_awaited(kernel: Any) -> bool:
-    """Whether another process compiles a kernel that this one can do without, and has not finished.
-
-    Parameters
-    ----------
-    kernel
-        A function that `njit` of this module returned.
-    """
+    """Whether another process still compiles a kernel that this one can do without."""
     name = f"{kernel.py_func.__module__}.{kernel.py_func.__name__}"
     if name in AWAITED and kept_signatures(kernel):
         AWAITED.remove(name)
@@ -112,13 +91,7 @@ def is_awaited(kernel: Any) -> bool:
 
 
 def is_being_compiled(kernel: Any) -> bool:
-    """Whether another process compiles a kernel at this moment.
-
-    Parameters
-    ----------
-    kernel
-        A function that `njit` of this module returned.
-    """
+    """Whether another process compiles a kernel at this moment."""
     try:
         with kernel._cache.lock(wait=False):
             return False
@@ -127,13 +100,7 @@ def is_being_compiled(kernel: Any) -> bool:
 
 
 def sources(path: Path) -> set[Path]:
-    """Every file with code that goes into the kernels of one file.
-
-    Parameters
-    ----------
-    path
-        The file that the kernels stand in.
-    """
+    """Every file with code that goes into the kernels of one file."""
     found: set[Path] = set()
     open_ends = [path.resolve(), *SHARED]
     while open_ends:
@@ -152,13 +119,7 @@ def _imports(path: Path) -> list[Path]:
 
 @cache
 def digest(path: Path) -> str:
-    """Digest of all code that goes into the kernels of one file.
-
-    Parameters
-    ----------
-    path
-        The file that the kernels stand in.
-    """
+    """Digest of all code that goes into the kernels of one file."""
     contents = [each.read_bytes() for each in sorted(sources(path))]
     return hashlib.sha256(b"".join(contents)).hexdigest()
 

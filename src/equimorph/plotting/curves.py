@@ -12,10 +12,9 @@ from equimorph.manifold.geometry.topology import adjacency, pieces
 from equimorph.model import position
 from equimorph.structures import States
 from equimorph.tasks.route import Route
+from equimorph.tolerances import ON_SIDE
 
 # Relative to the width of the box: boundary vertices lie on it to rounding.
-_ON_BOX = 1e-9
-"""Distance from a side of the box, relative to its width, of points that lie on it."""
 
 
 def fold_pieces(eset: EquilibriumSet) -> list[tuple[Int[np.ndarray, " _"], int]]:
@@ -182,7 +181,7 @@ def _along_box(
     eset: EquilibriumSet, vertices: Int[np.ndarray, " vertices"]
 ) -> Bool[np.ndarray, " edges"]:
     """Whether each edge of a polyline lies on one side of the box."""
-    slack = _ON_BOX * (eset.box.upper - eset.box.lower)
+    slack = ON_SIDE * (eset.box.upper - eset.box.lower)
     places = eset.coordinates[vertices]
     on_side = np.stack(
         [np.abs(places - eset.box.lower) <= slack, np.abs(places - eset.box.upper) <= slack]

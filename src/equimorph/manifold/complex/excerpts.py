@@ -44,9 +44,7 @@ from equimorph.manifold.geometry.topology import (
     senses,
 )
 from equimorph.structures import States
-
-ON_BOX = 1e-9
-"""Distance from a side of the box, relative to the width of the box, of points that lie on it."""
+from equimorph.tolerances import ON_SIDE
 
 
 @dataclass(frozen=True)
@@ -98,7 +96,7 @@ def _outer_marks(eset: EquilibriumSet, facets: Facets) -> Items:
     size = eset.box.upper - eset.box.lower
     marks = np.zeros(len(facets), int)
     for side, bound in enumerate((eset.box.lower, eset.box.upper)):
-        on = (np.abs(places - bound) <= ON_BOX * size).all(axis=1)
+        on = (np.abs(places - bound) <= ON_SIDE * size).all(axis=1)
         for k in range(len(size)):
             marks |= np.where(on[:, k], FacetMark.SIDE << (2 * k + side), 0)
     capped = np.isin(eset.kinds, (VertexKind.CAP, VertexKind.CORNER))

@@ -7,7 +7,7 @@ import numpy as np
 from equimorph.arrays import Bool, Int
 from equimorph.manifold.complex.marked_complex import Fabric, FacetMark, edges_of
 from equimorph.manifold.complex.vertices import Vertices, vertices_of
-from equimorph.manifold.geometry.topology import keys_of
+from equimorph.manifold.geometry.topology import keys_of, runs
 
 Ends = Int[np.ndarray, "_ 2"]
 Rows = Int[np.ndarray, " _"]
@@ -41,9 +41,8 @@ def copies(fabric: Fabric, ends: Ends) -> tuple[Rows, Ends]:
         return np.zeros(0, int), every
     wanted = _keys(fabric, ends)
     start, stop = (np.searchsorted(keys, wanted, side) for side in ("left", "right"))
-    row = np.repeat(np.arange(len(ends)), stop - start)
-    offset = np.arange(len(row)) - np.repeat(np.cumsum(stop - start) - (stop - start), stop - start)
-    found = every[start[row] + offset]
+    row, at = runs(start, stop - start)
+    found = every[at]
     other = (np.sort(ends[row], axis=1) != found).any(axis=1)
     # the same points may be joined by an edge off the crossing
     base = len(fabric.vertices)

@@ -5,8 +5,6 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from equimorph.arrays import (
     Bool,
@@ -22,6 +20,7 @@ from equimorph.arrays import (
     VertexFlags,
     VertexNumbers,
 )
+from equimorph.linalg.graphs import components
 from equimorph.manifold.geometry.kernels import orient
 from equimorph.manifold.geometry.simplices import volumes
 
@@ -148,10 +147,15 @@ def flags_of(facets: Int[np.ndarray, "F d"], chosen: Facets) -> Bool[np.ndarray,
     return np.isin(keys_of(facets, base), keys_of(chosen, base))
 
 
+def runs(start: Int[np.ndarray, " runs"], count: Int[np.ndarray, " runs"]) -> tuple[Items, Items]:
+    """Run of each of its members, and their numbers: start, start + 1, … of one after the other."""
+    run = np.repeat(np.arange(len(count)), count)
+    return run, np.arange(len(run)) + np.repeat(start - np.cumsum(count) + count, count)
+
+
 def labels(cells: int, links: Pairs) -> CellNumbers:
     """Connected pieces of cells over links, largest first."""
-    graph = coo_array((np.ones(len(links)), (links[:, 0], links[:, 1])), shape=(cells, cells))
-    _, label = connected_components(graph, directed=False)
+    label = components(cells, links)
     sizes = np.bincount(label)
     rank = np.empty(len(sizes), int)
     rank[np.argsort(-sizes, kind="stable")] = np.arange(len(sizes))
@@ -327,8 +331,7 @@ def cut_at_crossings(
         (own[:, None] * corners + at.argmax(axis=2)).ravel()
         for own, at in zip(links.T, same, strict=True)
     )
-    graph = coo_array((np.ones(len(first)), (first, second)), shape=(cells.size, cells.size))
-    _, around = connected_components(graph, directed=False)
+    around = components(cells.size, np.stack([first, second], axis=1))
     met = np.isin(cells.ravel(), crossings)
     # vertices off the crossings are never divided
     key = np.where(met, around, -1 - cells.ravel())

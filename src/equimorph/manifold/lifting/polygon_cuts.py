@@ -121,14 +121,8 @@ def chords_to_split(sides: tuple[int, ...], chords: tuple[Chord, ...]) -> tuple[
     """Chords between ends on one grid edge, and further ones until all pieces have triangles.
 
     Where a corner of the grid triangle sees two fold curves cross both its sides, one of them with
-    a cusp, the sheet between them lies over the corner twice, and has no allowed diagonal.
-
-    Parameters
-    ----------
-    sides
-        Of the grid triangle, on which each corner of the polygon lies, one bit each.
-    chords
-        Pairs of places in the polygon.
+    a cusp, the sheet between them lies over the corner twice, and has no allowed diagonal. `sides`
+    are those of the grid triangle on which each corner of the polygon lies, one bit each.
     """
     chosen = [chord for chord in chords if sides[chord[0]] & sides[chord[1]]]
     for chord in chords:

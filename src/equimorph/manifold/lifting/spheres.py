@@ -6,13 +6,19 @@ And the regions of closed ones between folds, with the points from which they ar
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from equimorph.arrays import Bool, Float, Int, ItemFlags, Items, ItemValues, Pairs, Triples
+from equimorph.linalg.graphs import components
 from equimorph.manifold.complex.base_mesh import BaseMesh
 from equimorph.manifold.geometry.simplices import volumes
-from equimorph.manifold.geometry.topology import adjacency, distinct, keys_of, labels, orientation
+from equimorph.manifold.geometry.topology import (
+    adjacency,
+    distinct,
+    keys_of,
+    labels,
+    orientation,
+    runs,
+)
 from equimorph.manifold.lifting.discs import Discs
 
 
@@ -146,8 +152,7 @@ def _copies(mesh: BaseMesh, discs: Discs, wanted: Bool[np.ndarray, " N"]) -> _Co
     clear = np.flatnonzero(wanted & ~unclear[mesh.faces].any(axis=1))
     faces = mesh.faces[clear].ravel()
     count = amount[faces]
-    offset = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
-    triangle = by_owner[np.repeat(first[faces], count) + offset]
+    triangle = by_owner[runs(first[faces], count)[1]]
     owner = np.repeat(np.repeat(clear, 4), count)
     met = discs.met[triangle]
     shares, piece = _pieces(
@@ -173,10 +178,8 @@ def _pieces(corners: Triples, owner: Items, sheet: Triples) -> tuple[Triples, It
     _, inverse, counts = np.unique(local, return_inverse=True, return_counts=True)
     order = np.argsort(inverse, kind="stable")
     same = np.flatnonzero(inverse[order[1:]] == inverse[order[:-1]])
-    a, b = order[same] // 3, order[same + 1] // 3
-    graph = coo_array((np.ones(len(a)), (a, b)), shape=(len(owner), len(owner)))
-    _, piece = connected_components(graph, directed=False)
-    return counts[inverse].reshape(-1, 3), piece
+    pairs = np.stack([order[same], order[same + 1]], axis=1) // 3
+    return counts[inverse].reshape(-1, 3), components(len(owner), pairs)
 
 
 @dataclass(frozen=True)

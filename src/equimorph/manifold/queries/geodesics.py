@@ -10,11 +10,10 @@ from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.geometry.tangents import frames_in_embedding
 from equimorph.manifold.queries.nearest import Ground, SetPoints
+from equimorph.tolerances import LAST_STEP
 
 SWEEPS, HALVINGS = 60, 8
 """Largest number of sweeps that straighten a chain, and of lengths of a step that are tried."""
-STILL = 1e-9
-"""Largest entry of a step that is the last, in the metric."""
 ROUND_OFF = 1e-15
 """Decrease of the sum of squared links, relative to it, that round-off hides."""
 FIRST, LAST = np.array([0]), np.array([-1])
@@ -102,7 +101,7 @@ class Chains:
         moves = dict(zip(moving, self._moves([self.chains[i] for i in moving]), strict=True))
         energy = {i: self._energy(self.chains[i]) for i in moving}
         todo = [i for i in moving if moves[i].gain > ROUND_OFF * energy[i]]
-        left = [i for i in todo if moves[i].size >= STILL]
+        left = [i for i in todo if moves[i].size >= LAST_STEP]
         for share in 0.5 ** np.arange(HALVINGS):
             if not todo:
                 break

@@ -16,7 +16,7 @@ from equimorph.manifold.geometry.setting import Setting
 from equimorph.manifold.geometry.tangents import cap_slopes, frames_in_embedding, split_step
 from equimorph.manifold.queries.nearest import Frames, Ground, SetPoints, free_steps
 from equimorph.model import worst_excess
-from equimorph.tolerances import METRIC_DIFFERENCE
+from equimorph.tolerances import LAST_STEP, LONGEST_STEP, METRIC_DIFFERENCE
 
 Residuals = Callable[[Lanes, Parameters], Float[np.ndarray, "lanes m"]]
 Steps = Float[np.ndarray, "lanes k"]
@@ -27,10 +27,6 @@ ITERATIONS, HALVINGS = 60, 12
 """Largest numbers of Newton steps, and of halvings of one step."""
 SHORTER = 0.5 ** np.arange(4.0)
 """Shares of a step that are tried at once."""
-LONGEST = 0.3
-"""Longest step in the metric."""
-STILL = 1e-9
-"""Length of a step that is the last."""
 LEVEL = 1e-14
 """Predicted fall of the squares, relative to them, that is lost in round-off."""
 STALLED = 1e-9
@@ -132,7 +128,7 @@ class _Descent:
         ground = self.ground
         setting, spot, box = ground.setting, move.spot, ground.eset.box
         along = np.einsum("lk,lkd->ld", move.step, free_steps(setting, move.frames))
-        along = np.where(np.abs(along) > 1e-12 * LONGEST, along * setting.scales, 0.0)
+        along = np.where(np.abs(along) > 1e-12 * LONGEST_STEP, along * setting.scales, 0.0)
         place = spot.p[:, setting.free]
         with np.errstate(divide="ignore", invalid="ignore"):
             shares = [
@@ -176,7 +172,7 @@ class _Descent:
             frames, rows = face.frames(SetPoints(move.spot.z[one], move.spot.p[one], guess.rows))
             new, good = face.move(guess, frames, np.zeros(frames.shape[:2]))
             norm = np.linalg.norm(self.residuals(new.z, new.p), axis=1)
-            near = share[k] * np.linalg.norm(move.step[k]) < STILL
+            near = share[k] * np.linalg.norm(move.step[k]) < LAST_STEP
             if good[0] and (norm[0] < self.value[lane] or near):
                 self.spot = self.spot.with_rows(lanes[one], SetPoints(new.z, new.p, rows))
                 self.value[lane], self.held[lane], landed[k] = norm[0], held[k], True
@@ -220,7 +216,7 @@ class _Move(Columns):
 
     def small(self, value: Values) -> Flags:
         """Which steps are lost in round-off, in length or in what they gain."""
-        short = np.linalg.norm(self.step, axis=1) < STILL
+        short = np.linalg.norm(self.step, axis=1) < LAST_STEP
         return np.asarray(short | (self.fall < LEVEL * value**2))
 
 
@@ -255,7 +251,7 @@ def _newton_step(ground: Ground, spot: SetPoints, residuals: Residuals) -> _Move
     along = np.einsum("lij,li->lj", vectors, gradient) / size
     step = -np.einsum("lij,lj->li", vectors, along)
     length = np.linalg.norm(step, axis=1, keepdims=True)
-    step = step * np.minimum(1.0, LONGEST / np.maximum(length, 1e-300))
+    step = step * np.minimum(1.0, LONGEST_STEP / np.maximum(length, 1e-300))
     return _Move(spot, frames, step, -np.einsum("lk,lk->l", gradient, step))
 
 

@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 
 from equimorph.argument_checks import check_arguments
@@ -11,6 +10,7 @@ from equimorph.arrays import Facets, Float, Int, Items, ItemValues, Lanes, Pairs
 from equimorph.equilibria import lift
 from equimorph.equilibria.critical import Critical, null_border
 from equimorph.errors import InputError
+from equimorph.linalg.graphs import graph_of, walk_back
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.manifold.complex.kept_tables import from_cache, places_of
 from equimorph.manifold.geometry.setting import embed
@@ -210,18 +210,15 @@ def _ways(eset: EquilibriumSet, state: State, stratum: int, boundary: Facets) ->
     count = len(eset.points)
     ends = np.concatenate([pairs, np.stack([np.full(len(around), count), around], axis=1)])
     to_them = np.linalg.norm(place[around] - own, axis=1)
-    graph = coo_array(
-        (np.concatenate([length, to_them]), ends.T), shape=(count + 1, count + 1)
-    ).tocsr()
+    graph = graph_of(count + 1, ends, np.concatenate([length, to_them]))
     far, before = dijkstra(graph, directed=False, indices=count, return_predecessors=True)
     chosen = _nearest_of_each_part(boundary, far)
     chosen = chosen[far[chosen] <= LONGER * far[chosen[0]]]
     ways = []
     for goal in chosen:
-        path = [int(goal)]
-        while before[path[-1]] != count:
-            path.append(int(before[path[-1]]))
-        ways.append(_from_state(eset, state, np.array(path[::-1])))
+        path = walk_back(before, count, int(goal))
+        assert path is not None
+        ways.append(_from_state(eset, state, path[1:]))
     return ways
 
 

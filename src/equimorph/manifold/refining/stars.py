@@ -8,7 +8,7 @@ import numpy as np
 
 from equimorph.arrays import Bool, Cells, Edges, Float, Int, ItemFlags, Items
 from equimorph.manifold.complex.marked_complex import TRIANGLES, Fabric, squared_sides
-from equimorph.manifold.geometry.topology import among, count_corners, distinct, keys_of
+from equimorph.manifold.geometry.topology import among, count_corners, distinct, keys_of, runs
 from equimorph.manifold.refining.quality import POOR, qualities, smallest_angles, worst
 
 GAIN = np.radians(0.2) / np.pi
@@ -52,9 +52,8 @@ class Around:
 
     def _pairs(self, vertices: Rows) -> Pairs:
         count = self._starts[vertices + 1] - self._starts[vertices]
-        row = np.repeat(np.arange(len(vertices)), count)
-        offset = np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count)
-        return row, self._order[self._starts[vertices][row] + offset] // self._corners
+        row, at = runs(self._starts[vertices], count)
+        return row, self._order[at] // self._corners
 
     def links(self, vertices: Rows, size: int, base: int) -> Pairs:
         """All pairs of a vertex, by its place in `vertices`, and the key of a face in its link."""

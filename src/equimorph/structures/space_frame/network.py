@@ -224,13 +224,7 @@ class SpatialNetwork(AnyFrameNetwork):
         return at
 
     def check_rotations(self) -> None:
-        """Refuse supports that hold the rotation of nothing.
-
-        Raises
-        ------
-        InputError
-            With the joint.
-        """
+        """Refuse supports that hold the rotation of nothing."""
         held = {each.parent for each in self.bodies}
         used = set(self.body_of_end.ravel().tolist()) | held
         for joint, support, own in zip(self.joints, self.supports, self.body_of_joint, strict=True):

@@ -141,12 +141,11 @@ def design(
     """
     problem = problem_of(family, variables, objective, within, tolerance)
     search = DesignSearch(problem, rebuilds)
-    return report(search, search.run(problem.family.start))
+    return report(search, *search.run(problem.family.start))
 
 
-def report(search: DesignSearch, ended: tuple[Judged, DesignStatus, str]) -> Design:
+def report(search: DesignSearch, last: Judged, status: DesignStatus, why: str) -> Design:
     """What is reported of a search."""
-    last, status, why = ended
     family, objectives = search.problem.family, search.problem.objectives
     return Design(
         status, why, family.values(last.x), family.structure(last.x),
@@ -262,7 +261,7 @@ def design_front(
     problem = problem_of(family, variables, first, (*within, _bound(second, LOOSE)), tolerance)
     start = DesignSearch(problem, rebuilds)
     ended = start.run(problem.family.start)
-    found = [(report(start, ended), ended[0])]
+    found = [(report(start, *ended), ended[0])]
     if ended[0].why:
         return DesignFront((found[0][0],), np.full((1, 2), np.nan))
     other = replace(problem, objectives=(second,), within=(*tuple(within), _bound(first, LOOSE)))
@@ -272,7 +271,7 @@ def design_front(
     for level in np.linspace(levels[0], levels[1], points)[1:-1].tolist():
         bounded = replace(problem, within=(*tuple(within), _bound(second, level)))
         found.append(_between(bounded, rebuilds, found[-1][1]))
-    found.append((report(search, last), _swap(last[0])))
+    found.append((report(search, *last), _swap(last[0])))
     values = [[judged.answers[0].value, judged.answers[-1].value] for _, judged in found]
     return DesignFront(tuple(each for each, _ in found), np.array(values))
 
@@ -280,7 +279,7 @@ def design_front(
 def _between(problem: DesignProblem, rebuilds: int, near: Judged) -> tuple[Design, Judged]:
     search = DesignSearch(problem, rebuilds)
     ended = search.run(near.x, near)
-    return report(search, ended), ended[0]
+    return report(search, *ended), ended[0]
 
 
 def _bound(question: Asked, level: float) -> DesignBound:

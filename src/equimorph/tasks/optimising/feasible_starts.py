@@ -17,6 +17,7 @@ from equimorph.tasks.optimising.programme import Objective, Programme
 from equimorph.tasks.optimising.sqp import descend
 from equimorph.tasks.optimising.tangent_steps import project_onto_set, step_along, tangents_at
 from equimorph.tasks.stable_part import stable_values
+from equimorph.tolerances import LONGEST_STEP
 
 DIVISIONS = {1: 8, 2: 5, 3: 3}
 """Parts of a side of a cell between sample places, by dimension."""
@@ -27,8 +28,6 @@ ROUNDS = 20
 PATIENCE = 4
 """Steps one after the other that do not lower the least excess by a tenth, after which a lane is
 given up: it goes to and fro."""
-LONGEST = 0.3
-"""Longest step in the metric."""
 MET = 1e-8
 """Relative excess over a bound that counts as none."""
 STARTS = 24
@@ -217,7 +216,7 @@ def _towards(
     rows, rhs = np.where(bad[:, :, None], slopes, 0.0), np.where(bad, -excess, 0.0)
     step = np.einsum("ldk,lk->ld", np.linalg.pinv(rows, rcond=1e-6), rhs)
     size = np.linalg.norm(step, axis=1, keepdims=True)
-    return np.asarray(step * np.minimum(1.0, LONGEST / np.maximum(size, 1e-300)))
+    return np.asarray(step * np.minimum(1.0, LONGEST_STEP / np.maximum(size, 1e-300)))
 
 
 def _lowest_around(

@@ -13,13 +13,12 @@ from equimorph.model import position
 from equimorph.structures import State
 from equimorph.tasks.maps.curves import MapCurve
 from equimorph.tasks.maps.limit_load import LimitLoadMap
+from equimorph.tolerances import LAST_STEP
 
 ITERATIONS = 20
 """Steps along a curve towards its highest point."""
 LONGEST, LEVEL = 0.05, 1e-12
 """Longest step along a curve; slope of the load at which its top is reached."""
-STILL = 1e-9
-"""Length of a step that is the last."""
 CLOSE = 1e-6
 """Distance from a curve, in scales, at which its sides are examined."""
 ALIKE = 1e-7
@@ -113,7 +112,7 @@ def _top_of_ridge(lmap: LimitLoadMap, locus: Locus, spot: Spots | None) -> Ridge
         change = (_rise(ahead) - slope) / SLOPE
         step = -slope / change if change < 0.0 else LONGEST * float(np.sign(slope))
         step = float(np.clip(step, -LONGEST, LONGEST))
-        if abs(step) < STILL:
+        if abs(step) < LAST_STEP:
             break
         spot = _step_along(locus, spot, step)
     if spot is None:

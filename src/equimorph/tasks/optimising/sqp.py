@@ -14,14 +14,10 @@ from equimorph.structures import States
 from equimorph.tasks.optimising.programme import Expansion, Programme
 from equimorph.tasks.optimising.quadratic import Quadratic, QuadraticStep, solve
 from equimorph.tasks.optimising.tangent_steps import project_onto_set, step_along, tangents_at
-from equimorph.tolerances import FEASIBLE
+from equimorph.tolerances import FEASIBLE, LAST_STEP, LONGEST_STEP
 
 ITERATIONS, HALVINGS = 40, 10
 """Most steps of a descent, and how often a step is halved that does not lower the merit."""
-LONGEST = 0.3
-"""Longest step in the metric."""
-STILL = 1e-9
-"""Length of a step that is the last."""
 STALLED = 1e-6
 """Length of a step below which a merit that no longer falls is round-off."""
 MERGED = 0.01
@@ -129,7 +125,7 @@ class _Lane:
     """One start on its way."""
 
     point: SetPoints
-    reach: float = LONGEST
+    reach: float = LONGEST_STEP
     penalty: float = 1.0
     creeping: int = 0
     answer: QuadraticStep | None = None
@@ -141,7 +137,7 @@ class _Lane:
         """Note whether the whole step was made, and its length."""
         self.creeping = 0 if whole or length > CLOSE else self.creeping + 1
         if whole:
-            self.reach = min(LONGEST, 2.0 * self.reach)
+            self.reach = min(LONGEST_STEP, 2.0 * self.reach)
 
 
 def descend(
@@ -248,7 +244,7 @@ def _advance(
         lane.answer = answer
         if answer is None:
             lane.reach = 0.0
-        elif np.linalg.norm(answer.step) < STILL:
+        elif np.linalg.norm(answer.step) < LAST_STEP:
             lane.done = at.minimum(k, answer, converged=True)
         else:
             own = PENALTY * max(float(answer.multipliers.sum()), _steepness(at.expansion, k))

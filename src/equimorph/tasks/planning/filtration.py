@@ -15,13 +15,13 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import breadth_first_order, minimum_spanning_tree
 
 from equimorph.arrays import Facets, Float, Int, Items, ItemValues, Pairs, Some
+from equimorph.linalg.graphs import walk_back
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.complex.kept_tables import from_cache
 from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.topology import adjacency
 from equimorph.model import Constraint
 from equimorph.tasks.optimising.programme import Branches, Objective, match_branches
-from equimorph.tasks.planning.network import walk_back
 from equimorph.tasks.stable_part import SLACK, stable_values
 
 Shares = Float[np.ndarray, "n d"]
@@ -150,10 +150,8 @@ class Filtration:
         tree = minimum_spanning_tree(graph.tocsr())
         start, goal = np.searchsorted(self.passages.cells, [first, last]).tolist()
         _, before = breadth_first_order(tree, start, directed=False)
-        path = walk_back(before, start, goal) if goal != start else np.array([start])
-        if path is None:
-            return None
-        return self.passages.between(path)
+        path = walk_back(before, start, goal)
+        return None if path is None else self.passages.between(path)
 
 
 def _crossing_lines(known: Branches, first: Items, second: Items) -> Float[np.ndarray, "n 2 2"]:

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import cKDTree
 
 from equimorph.arrays import Float, Int, Values
+from equimorph.linalg.graphs import graph_of, walk_back
 from equimorph.manifold import EquilibriumSet
 from equimorph.structures import States
 from equimorph.tasks.planning.network import (
@@ -19,7 +19,6 @@ from equimorph.tasks.planning.network import (
     end_links,
     network_of,
     nodes_with_ends,
-    walk_back,
 )
 
 DETOUR, APART = 0.1, 0.15
@@ -72,9 +71,7 @@ class _Trees:
 
     @classmethod
     def of(cls, count: int, pairs: Pairs, costs: Values) -> "_Trees":
-        weights = np.maximum(costs, 1e-300)
-        graph = coo_array((weights, pairs.T), shape=(count, count)).tocsr()
-        ends = [count - 2, count - 1]
+        graph, ends = graph_of(count, pairs, costs), [count - 2, count - 1]
         return cls(*dijkstra(graph, directed=False, indices=ends, return_predecessors=True))
 
     @cached_property

@@ -4,14 +4,13 @@ from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components, dijkstra
 
 from equimorph.arrays import Bool, Flags, Float, Int, Lanes, Parameters, Some, Values
 from equimorph.equilibria import ParameterLine, TraceOptions
 from equimorph.equilibria.soft_modes import metric_length
 from equimorph.equilibria.trace import Traces, trace
 from equimorph.equilibria.trace_options import EventCode
+from equimorph.linalg.graphs import components
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.complex.kept_tables import from_cache
 from equimorph.manifold.geometry.topology import faces_of
@@ -149,30 +148,6 @@ def _costs(source: States, line: ParameterLine, outcome: Traces, objective: Obje
     return np.bincount(lane[pairs], costs, len(lanes))
 
 
-def shortest_path(
-    count: int, pairs: Int[np.ndarray, "links 2"], costs: Values, ends: tuple[int, int]
-) -> Int[np.ndarray, " n"] | None:
-    """Cheapest path from one node to another by Dijkstra; None if no path exists."""
-    # a cost of zero would be no link in a sparse matrix
-    weights = np.maximum(costs, 1e-300)
-    graph = coo_array((weights, pairs.T), shape=(count, count)).tocsr()
-    start, goal = ends
-    _, before = dijkstra(graph, directed=False, indices=start, return_predecessors=True)
-    return walk_back(before, start, goal)
-
-
-def walk_back(
-    before: Int[np.ndarray, " nodes"], start: int, goal: int
-) -> Int[np.ndarray, " n"] | None:
-    """Path to a goal by the predecessors of all nodes; None if it was not reached."""
-    if before[goal] < 0 and goal != start:
-        return None
-    path = [goal]
-    while path[-1] != start:
-        path.append(int(before[path[-1]]))
-    return np.array(path[::-1])
-
-
 class Network:
     """States of a set that a route may visit, links between them, and what is known of these.
 
@@ -303,9 +278,7 @@ def explain_no_route(eset: EquilibriumSet, ends: Ends, demands: Demands) -> str:
     allowed = network.admissible(eset, free)
     own, _ = end_links(eset, ends, free)
     pairs = np.concatenate([network.pairs[allowed[network.pairs].all(axis=1)], own])
-    count = len(eset.points) + 2
-    graph = coo_array((np.ones(len(pairs)), pairs.T), shape=(count, count))
-    _, label = connected_components(graph, directed=False)
+    label = components(len(eset.points) + 2, pairs)
     if label[-1] != label[-2]:
         return "start and goal lie on different stable components of the set"
     words = [str(constraint) for constraint in demands.constraints]

@@ -4,10 +4,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from equimorph.equilibria.soft_modes import metric_length
+from equimorph.linalg.graphs import components
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Descriptor, ease
 from equimorph.structures import State, margin_of
@@ -140,8 +139,7 @@ def _nearest(eset: EquilibriumSet, ends: Ends, demands: Demands) -> State | None
     own, _ = end_links(eset, ends, demands)
     inner = network.pairs[allowed[network.pairs].all(axis=1) & ~broken]
     pairs = np.concatenate([inner, own])
-    graph = coo_array((np.ones(len(pairs)), pairs.T), shape=(count + 2, count + 2))
-    _, label = connected_components(graph, directed=False)
+    label = components(count + 2, pairs)
     some = np.flatnonzero(label[:count] == label[count])
     if len(some) == 0:
         return None

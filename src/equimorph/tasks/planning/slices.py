@@ -13,11 +13,10 @@ from collections.abc import Iterator, Sequence
 from itertools import combinations, pairwise
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from equimorph.arrays import Pairs
 from equimorph.equilibria.settle import distances
+from equimorph.linalg.graphs import components, shortest_path
 from equimorph.manifold import EquilibriumSet, equilibrium_set
 from equimorph.manifold.queries.locate import pieces_of
 from equimorph.model import Box, Constraint
@@ -28,7 +27,6 @@ from equimorph.tasks.planning.network import (
     Demands,
     Ends,
     lift_straight,
-    shortest_path,
 )
 from equimorph.tolerances import SAME_NUMBER
 
@@ -189,8 +187,7 @@ class Slices:
     def _nearest(self) -> Iterator[int]:
         """New stations: the states reached from either end that are nearest to the other one."""
         pairs, count = self._links(), len(self.stations)
-        graph = coo_array((np.ones(len(pairs)), pairs.T), shape=(count, count))
-        _, label = connected_components(graph, directed=False)
+        label = components(count, pairs)
         sides = [
             [self._states_of(each) for each, some in self.regions.items() if label[some[0]] == own]
             for own in label[:2]

@@ -5,11 +5,11 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 
 from equimorph.arrays import Float, Int
 from equimorph.equilibria import Landing, Path, lift, snap_landing
+from equimorph.linalg.graphs import graph_of, walk_back
 from equimorph.manifold import EquilibriumSet, Snap, snap_graph
 from equimorph.manifold.complex.kept_tables import from_cache
 from equimorph.model import Descriptor
@@ -23,7 +23,6 @@ from equimorph.tasks.planning.network import (
     neighbours,
     network_of,
     nodes_with_ends,
-    walk_back,
 )
 from equimorph.tasks.planning.objectives import ROUGH
 from equimorph.tasks.planning.snap_places import SnapPlace, cheapest_place
@@ -196,9 +195,9 @@ class _Search:
         rows = [one, other, one + count, other + count, sources, sources + count]
         columns = [other, one, other + count, one + count, targets + count, targets + count]
         costs = np.concatenate([*[weights] * 4, *[to_folds + self.price] * 2])
-        pairs = np.concatenate(rows), np.concatenate(columns)
+        pairs = np.stack([np.concatenate(rows), np.concatenate(columns)], axis=1)
         # of links given twice, like that from start to goal, sparse matrices would add the costs
-        graph = coo_array((np.maximum(costs, 1e-300), pairs), shape=(2 * count, 2 * count)).tocsr()
+        graph = graph_of(2 * count, pairs, costs)
         start, goal = self.first - 2, count + self.first - 1
         cost, before = dijkstra(graph, indices=start, return_predecessors=True)
         return walk_back(before, start, goal), float(cost[goal])

@@ -10,11 +10,12 @@ from equimorph.equilibria import Guards, ParameterLine, TraceOptions, settle
 from equimorph.equilibria.trace import trace
 from equimorph.equilibria.trace_options import EventCode
 from equimorph.errors import InputError
+from equimorph.linalg.graphs import shortest_path
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Descriptor, position
 from equimorph.structures import States
 from equimorph.tasks.planning.corner_moves import ActuatorBox, chords, move_by_chords, move_by_lifts
-from equimorph.tasks.planning.network import Demands, Ends, connect, shortest_path
+from equimorph.tasks.planning.network import Demands, Ends, connect
 from equimorph.tasks.planning.shortening import Shortener
 from equimorph.tasks.route import Corners, Route, refusal, verify_route
 from equimorph.tasks.start import check_equilibrium, check_fixed_parameters, inadmissible

@@ -16,10 +16,9 @@ from equimorph.manifold.geometry.topology import facets_of, flags_of, pieces
 from equimorph.manifold.lookup.cell_index import CellIndex
 from equimorph.model import Descriptor
 from equimorph.structures import States
+from equimorph.tolerances import ON_SIDE
 
 Kind = Literal["snap-through", "singular Jacobian", "actuator limit", "constraint", "open"]
-ON_BOX = 1e-9
-"""Distance from a side of the box, in its widths, within which a facet lies on it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -185,7 +184,7 @@ def _outer(
 
 def _sides(eset: EquilibriumSet, facets: Int[np.ndarray, "F d"]) -> list[str]:
     """Side of the box on which each facet lies, or nothing."""
-    at, room = eset.coordinates[facets], ON_BOX * (eset.box.upper - eset.box.lower)
+    at, room = eset.coordinates[facets], ON_SIDE * (eset.box.upper - eset.box.lower)
     out = np.full(len(facets), "", dtype=object)
     for bounds in (eset.box.lower, eset.box.upper):
         on = (np.abs(at - bounds) <= room).all(axis=1)

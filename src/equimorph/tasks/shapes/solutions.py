@@ -241,7 +241,7 @@ def solve_shapes(
         order = np.lexsort((key, index[k], np.where(misfit > EXACT, misfit, 0.0)))
         ways = tuple(routes[i] for i in order) if routes else ()
         found = states[order], index[k][order], misfit[order], ways
-        answers.append(_answer(known, values, constraints, found, int(closest[k])))
+        answers.append(_answer(known, values, constraints, *found, int(closest[k])))
     return tuple(answers)
 
 
@@ -277,18 +277,21 @@ def _answer(
     known: Predictor,
     targets: Float[np.ndarray, " k"],
     within: tuple[Constraint, ...],
-    found: tuple[States, Int[np.ndarray, " lanes"], Values, tuple[Route, ...]],
+    states: States,
+    index: Int[np.ndarray, " lanes"],
+    misfit: Values,
+    routes: tuple[Route, ...],
     closest: int,
 ) -> Shapes:
     """Solutions of one question, in order, with their indices, misfits and routes."""
-    misfit, gaps = found[2], (known.values[closest] - targets).tolist()
+    gaps = (known.values[closest] - targets).tolist()
     miss = dict(zip([each.name for each in known.descriptors], gaps, strict=True))
     status: Literal["solved", "fitted", "refused"] = "solved"
     if (misfit > EXACT).all():
         status = "fitted" if len(misfit) else "refused"
     why = "" if status == "solved" else _why(known.descriptors, targets, miss)
     vertex = known.eset.points[closest]
-    return Shapes(status, why, *found, vertex, miss, targets, within, known)
+    return Shapes(status, why, states, index, misfit, routes, vertex, miss, targets, within, known)
 
 
 def _solve(

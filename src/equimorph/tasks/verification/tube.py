@@ -18,6 +18,7 @@ from equimorph.columns import Columns
 from equimorph.equilibria import Event, ParameterLine, TraceOptions, settle, trace
 from equimorph.equilibria.soft_modes import metric_length
 from equimorph.equilibria.trace_options import EventCode
+from equimorph.manifold.geometry.topology import runs
 from equimorph.model import Constraint, worst_relative_excess
 from equimorph.structures import State, States, Structure
 from equimorph.tasks.verification.error_box import Deviation, ErrorBox
@@ -388,9 +389,7 @@ def neighbours(lower: Corners, upper: Corners) -> Pairs:
     begins = lower[order, axis]
     # of the cells behind each in this order those that begin before it ends
     counts = np.searchsorted(begins, upper[order, axis], side="right") - np.arange(len(order)) - 1
-    one = np.repeat(np.arange(len(order)), counts)
-    other = one + 1 + np.arange(len(one)) - np.repeat(np.cumsum(counts) - counts, counts)
-    one, other = order[one], order[other]
+    one, other = (order[each] for each in runs(1 + np.arange(len(order)), counts))
     overlap = np.minimum(upper[one], upper[other]) - np.maximum(lower[one], lower[other])
     faces = (overlap >= 0.0).all(axis=1) & ((overlap == 0.0).sum(axis=1) == 1)
     return np.stack([one[faces], other[faces]], axis=1)

@@ -17,6 +17,7 @@ from scipy.sparse.csgraph import breadth_first_order, dijkstra
 from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Flags, Int, Values
 from equimorph.errors import InputError
+from equimorph.linalg.graphs import graph_of, walk_back
 from equimorph.manifold import EquilibriumSet, SnapGraph, snap_graph
 from equimorph.manifold.queries.snap_graph import NOWHERE
 from equimorph.model import Constraint
@@ -216,10 +217,8 @@ class WordGraph:
             kinds = ("free", *(("snap",) if snaps else ()))
             kinds += ("possible snap",) if snaps and not certain else ()
             best = [min(own, key=_work) for own in self._between(kinds).values()]
-            # a weight of zero would be no link in a sparse matrix
-            weights = [max(each.work, 1e-300) for each in best]
-            ends = [each.start for each in best], [each.goal for each in best]
-            graphs[snaps, certain] = csr_array((weights, ends), shape=(count, count))
+            pairs = np.array([(each.start, each.goal) for each in best], int).reshape(-1, 2)
+            graphs[snaps, certain] = graph_of(count, pairs, np.array([_work(e) for e in best]))
         return graphs
 
     def _between(self, kinds: tuple[str, ...]) -> dict[tuple[int, int], list[WordMove]]:
@@ -234,10 +233,10 @@ class WordGraph:
         self, before: Int[np.ndarray, " stops"], first: int, last: int, snaps: bool
     ) -> Iterator[WordMove]:
         """Moves of the way that Dijkstra found, in order."""
-        between, way = self._between(("free", "snap") if snaps else ("free",)), [last]
-        while way[-1] != first:
-            way.append(int(before[way[-1]]))
-        for pair in pairwise(way[::-1]):
+        between = self._between(("free", "snap") if snaps else ("free",))
+        way = walk_back(before, first, last)
+        assert way is not None
+        for pair in pairwise(way.tolist()):
             yield min(between[pair], key=_work)
 
 
