@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from equimorph.manifold.geometry.kernels import cut_rows
 from equimorph.manifold.geometry.topology import (
     adjacency,
     chains,
@@ -130,3 +131,16 @@ def test_projected_area_is_signed():
     corners = np.array([[0.0, 0.0], [2.0, 0.0], [0.0, 3.0]])
     cells = np.array([[0, 1, 2], [0, 2, 1]])
     assert projected_volume(corners, cells).tolist() == [3.0, -3.0]
+
+
+def test_many_cells_around_one_edge_are_cut_in_two_each():
+    """Every triangle (0, 1, k) gives (new, 1, k) and, behind all of them, (0, new, k)."""
+    count = 300
+    rows = np.stack([np.zeros(count), np.ones(count), np.arange(2, count + 2)], axis=1).astype(int)
+    base = count + 2
+    cut, owner = cut_rows(rows, np.array([[0, 1]]), base)
+    assert len(cut) == len(owner) == 2 * count
+    assert owner.tolist() == 2 * list(range(count))
+    assert {frozenset(row) for row in cut.tolist()} == {
+        frozenset((base, end, k)) for end in (0, 1) for k in range(2, base)
+    }

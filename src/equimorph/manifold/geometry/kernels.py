@@ -218,9 +218,9 @@ def cut_rows(rows, edges, base):
         following[e], head[low] = head[low], e
     count, corners = rows.shape
     room = count + 4 * edges.shape[0] + 16
-    out, owner, active = rows_with_room(rows, room), np.empty(room, np.int64), np.arange(count)
-    for i in range(count):
-        owner[i] = i
+    active = np.arange(count)
+    # both are lengthened by the same rule: neither has room where the other has none
+    out, owner = rows_with_room(rows, room), with_room(active, room)
     while active.shape[0] > 0:
         cut, start = 0, count
         for i in range(active.shape[0]):
