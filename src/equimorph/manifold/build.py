@@ -31,6 +31,7 @@ from equimorph.manifold.lifting.tiles import cuts_between
 from equimorph.manifold.lifting.unseen import UnseenFinder
 from equimorph.manifold.question import intervals_of, limit_of, setting_of, tiles_of
 from equimorph.manifold.refining.refine import refine_cells
+from equimorph.manifold.sides import box_of, is_stuck_at_sides, trimmed, widened
 from equimorph.model import Box, Constraint, Journal, Progress, Silent, Workers
 from equimorph.structures import Structure
 
@@ -189,17 +190,40 @@ def _on_grids(order: _Order, intervals: tuple[int, ...]) -> EquilibriumSet:
 
 
 def _of_grid(order: _Order, intervals: tuple[int, ...]) -> EquilibriumSet:
-    """Lift a set over one grid, and what the completeness checks find that it lacks."""
-    lines, setting, effort = grid_lines(order.box, intervals), order.setting, order.effort
+    """Lift a set over one grid, and where sides of the box hinder that, over sides moved outwards.
+
+    They do where curves of singular states lie in a side, touch it, or meet it in a corner.
+    """
+    lines, box = grid_lines(order.box, intervals), order.box
+    lifting = _start_lifting(order, lines)
+    cells, eset = lifting.upright()
+    if is_stuck_at_sides(lifting.pairing, cells):
+        wide = widened(lines, order.setting.limits)
+        beyond = replace(
+            order, box=box_of(box.names, wide), effort=replace(order.effort, tiles=None)
+        )
+        again = _start_lifting(beyond, wide)
+        found = trimmed(_complete(again, *again.upright()), box)
+        if sum(found.audit.faults.values()) < sum(eset.audit.faults.values()):
+            return found
+    return _complete(lifting, cells, eset)
+
+
+def _start_lifting(order: _Order, lines: Lines) -> "_Lifting":
+    """Points over the vertices of a grid from which it can be lifted."""
     order.progress.report("seeds", 0, 1)
-    pairing = start_pairing(setting, grid_mesh(lines), effort.limit)
-    pairing.points.over_vertices(*_spread(pairing, lines, effort.seed, order.progress))
+    pairing = start_pairing(order.setting, grid_mesh(lines), order.effort.limit)
+    pairing.points.over_vertices(*_spread(pairing, lines, order.effort.seed, order.progress))
+    return _Lifting(pairing, order, tuple(len(line) - 1 for line in lines), order.rounds(lines))
+
+
+def _complete(lifting: "_Lifting", cells: Cells, eset: EquilibriumSet) -> EquilibriumSet:
+    """A set, and what the completeness checks find that it lacks."""
+    pairing, order, effort = lifting.pairing, lifting.order, lifting.order.effort
     generator = np.random.default_rng([effort.seed, 1])
-    lifting = _Lifting(pairing, order, intervals, order.rounds(lines))
     recovered = 0
     for number in range(SEARCHES):
-        cells, eset = lifting.upright()
-        found = check(eset, generator, _checks(effort.checks, setting), order.progress)
+        found = check(eset, generator, _checks(effort.checks, order.setting), order.progress)
         lacking = len(found.missing)
         # what stays undecided in spite of bisection is not mended by more equilibria
         ended = pairing.is_full or cells.doubtful > HOPELESS
@@ -208,6 +232,7 @@ def _of_grid(order: _Order, intervals: tuple[int, ...]) -> EquilibriumSet:
         recovered += lacking
         some = np.unique(np.linspace(0, lacking - 1, RECOVERED).astype(int))
         recover(pairing, found.missing[some])
+        cells, eset = lifting.upright()
     return lifting.with_checks(cells, eset, found, recovered)
 
 

@@ -129,9 +129,10 @@ def fill(pairing: Pairing, discs: Discs, wanted: Bool[np.ndarray, " N"]) -> Ball
     doubtful[closed.owner[~parts.whole]] = True
     middles = _middles(pairing, parts, doubtful)
     apexes = _apexes(pairing, parts, middles, doubtful)
-    apexes, overturned = upright_apexes(
-        parts, middles, apexes, pairing.points.p[:, pairing.setting.free]
-    )
+    known = pairing.points.p[
+        : pairing.points.count
+    ]  # no point has number −1, the last one stands in
+    apexes, overturned = upright_apexes(parts, middles, apexes, known[:, pairing.setting.free])
     own = closed.owner[parts.region_surface]
     doubtful[own[overturned & ((parts.first_curve < 0) | _large(pairing.mesh)[own])]] = True
     filled = _cone(parts, middles, apexes, ~doubtful[closed.owner])

@@ -1,0 +1,302 @@
+"""Sides of the box: sets are lifted over sides moved outwards, and end at the sides again.
+
+See docs/decisions.md, "Sides in which a set is singular are moved outwards".
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import combinations
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from equimorph.arrays import (
+    CellFlags,
+    Facets,
+    Float,
+    Int,
+    ItemFlags,
+    Items,
+    Pairs,
+    VertexFlags,
+    VertexNumbers,
+)
+from equimorph.manifold.complex.description import Complex, describe_again
+from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
+from equimorph.manifold.complex.excerpts import excerpt_of, sheets_of
+from equimorph.manifold.complex.vertices import Vertices
+from equimorph.manifold.geometry.exact_points import Aim, Pinned, correct_points
+from equimorph.manifold.geometry.points import VertexKind, are_singular
+from equimorph.manifold.geometry.setting import embed
+from equimorph.manifold.geometry.topology import adjacency
+from equimorph.manifold.lifting.cells import Cells
+from equimorph.manifold.lifting.grid import Lines
+from equimorph.manifold.lifting.pairing import Pairing, abandoned_rays
+from equimorph.manifold.lookup.exact_states import lift_to
+from equimorph.manifold.queries.levels import cut_along, part_of
+from equimorph.model import Box
+from equimorph.structures import States
+from equimorph.tolerances import SAME_VERTEX
+
+OUTWARDS = 1e-4
+"""Part of an interval by which sides are moved: sheets that cross in a side are as far apart."""
+SHARES = np.array([1.0, 0.6180, 0.7549])
+"""Of the free parameters: diagonals through corners must not pass through the moved ones."""
+ON_SIDE = 1e-9
+"""Distance from a side, in widths of the box, of vertices that lie on it."""
+
+
+def is_stuck_at_sides(pairing: Pairing, cells: Cells) -> bool:
+    """Whether most of what could not be decided or lifted touches sides of the box."""
+    mesh = pairing.mesh
+    if pairing.is_full:
+        return False
+    low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
+    on_side = ((mesh.vertices == low) | (mesh.vertices == high)).any(axis=1)
+    lost = np.array([edge for _, edge in abandoned_rays(pairing)], int)
+    groups = (
+        mesh.triangles[cells.doubtful_triangles],
+        mesh.tetrahedra[cells.doubtful_tetrahedra],
+        mesh.edges[lost],
+    )
+    touching = np.concatenate([on_side[own].any(axis=1) for own in groups])
+    return bool(len(touching)) and bool(2 * touching.sum() > len(touching))
+
+
+def widened(lines: Lines, limits: Float[np.ndarray, "2 d"]) -> Lines:
+    """Lines of a grid with the outer ones moved outwards, within limits of the parameters."""
+    out = []
+    for share, line, (low, high) in zip(SHARES, lines, limits.T, strict=False):
+        move = OUTWARDS * share * (line[-1] - line[0]) / (len(line) - 1)
+        first = line[0] - min(move, 0.5 * (line[0] - low))
+        last = line[-1] + min(move, 0.5 * (high - line[-1]))
+        out.append(np.concatenate([[first], line[1:-1], [last]]))
+    return tuple(out)
+
+
+def box_of(names: tuple[str, ...], lines: Lines) -> Box:
+    """The box that a grid fills."""
+    return Box(**{n: (line[0], line[-1]) for n, line in zip(names, lines, strict=True)})
+
+
+def trimmed(eset: EquilibriumSet, box: Box) -> EquilibriumSet:
+    """The part of a set over a box whose sides are a little inside those of its own."""
+    trim = _Trim(_without_beyond(eset, box), box)
+    eset = trim.on_sides()
+    for axis in range(len(box.names)):
+        for lower in (True, False):
+            eset = _cut_off(eset, box, axis, lower=lower)
+    # edges that could not be cut leave grid cells in doubt
+    audit = eset.audit
+    audit = replace(audit, undecided=audit.undecided + audit.unrefined, unrefined=0)
+    mesh = replace(eset.mesh, vertices=np.clip(eset.mesh.vertices, box.lower, box.upper))
+    points = States(eset.structure, eset.points.z, _without_round_off(eset, box))
+    return replace(eset, box=box, mesh=mesh, points=points, audit=audit)
+
+
+def _without_round_off(eset: EquilibriumSet, box: Box) -> Float[np.ndarray, "V P"]:
+    """Parameters of vertices; those on sides lie on them to the last digit."""
+    p, place = eset.points.p.copy(), eset.coordinates
+    on_side = np.clip(place, box.lower, box.upper)
+    near = np.abs(on_side - place) <= ON_SIDE * (box.upper - box.lower)
+    p[:, eset.setting.free] = np.where(near, on_side, place)
+    return p
+
+
+def _sides(eset: EquilibriumSet, box: Box) -> Iterator[tuple[int, float, Float[np.ndarray, " V"]]]:
+    """Parameters and signs of the sides of a box, and how far beyond each the vertices lie."""
+    for axis in range(len(box.names)):
+        for bound, sign in ((box.lower, -1.0), (box.upper, 1.0)):
+            yield axis, sign, sign * (eset.coordinates[:, axis] - bound[axis])
+
+
+def _only(eset: EquilibriumSet, cells: CellFlags) -> Complex:
+    """Some cells of a set."""
+    recut = excerpt_of(eset, np.zeros(len(eset.cells), bool)).put_back()
+    return recut.complex(cells, np.zeros(len(recut.points), bool))
+
+
+def _without_beyond(eset: EquilibriumSet, box: Box) -> EquilibriumSet:
+    """The set without cells that lie beyond a side, or in it."""
+    kept, width = np.ones(len(eset.cells), bool), box.upper - box.lower
+    for axis, _, beyond in _sides(eset, box):
+        kept &= (beyond < -ON_SIDE * width[axis])[eset.cells].any(axis=1)
+    return eset if kept.all() else describe_again(eset, _only(eset, kept), eset.setting)
+
+
+@dataclass(frozen=True, eq=False)
+class _Trim:
+    """A set over a box with sides that were moved outwards, and the box itself."""
+
+    eset: EquilibriumSet
+    box: Box
+
+    def on_sides(self) -> EquilibriumSet:
+        """The set with vertices beyond sides on these, as far as it goes on to there."""
+        eset, kinds = self.eset, self.eset.kinds
+        z, p, found = eset.points.z.copy(), eset.points.p.copy(), ~self._beyond
+        curved = are_singular(kinds) | (kinds == VertexKind.CAP)
+        plain = np.flatnonzero(~curved & self._beyond)
+        for rows, at in ((plain, self._lifted(plain)), *self._on_curves(curved)):
+            own = rows[at.found]
+            z[own], p[own], found[own] = at.z[at.found], at.p[at.found], True
+        points = States(eset.structure, z, p)
+        whole = replace(_only(eset, np.ones(len(eset.cells), bool)), points=points, fresh=None)
+        pairs = np.concatenate([self._coinciding(points), self._swallowed(points, found)])
+        same = pairs[:0]
+        for own in _groups(pairs, len(points)):
+            more = np.concatenate([same, own])
+            same = same if _folds_over(whole, more) else more
+        return describe_again(eset, _welded(whole, same), eset.setting)
+
+    @cached_property
+    def _beyond(self) -> VertexFlags:
+        """Vertices that lie beyond sides."""
+        place = self.eset.coordinates
+        return np.asarray(((place < self.box.lower) | (place > self.box.upper)).any(axis=1))
+
+    @cached_property
+    def _clipped(self) -> Float[np.ndarray, "V P"]:
+        """Parameters of the nearest points of the box."""
+        p, free = self.eset.points.p.copy(), self.eset.setting.free
+        p[:, free] = np.clip(p[:, free], self.box.lower, self.box.upper)
+        return p
+
+    def _lifted(self, rows: Items) -> Pinned:
+        """States lifted straight to sides, with the index that they had."""
+        eset, start, p = self.eset, self.eset.points[rows], self._clipped[rows]
+        z, found = start.z.copy(), np.zeros(len(rows), bool)
+        there, which = lift_to(start, p, eset.constraints)
+        same = eset.structure.index(there, p[which]) == eset.index[rows[which]]
+        z[which[same]], found[which[same]] = there[same], True
+        return Pinned(z, p, found)
+
+    def _on_curves(self, curved: VertexFlags) -> Iterator[tuple[Items, Pinned]]:
+        """Vertices on folds, constraints and crossings beyond sides, and such points on sides.
+
+        As many parameters move as there are conditions, in any way that finds a point: the nearest
+        one counts.
+        """
+        eset, d = self.eset, len(self.box.names)
+        for kind in (VertexKind.FOLD, VertexKind.CAP, VertexKind.CORNER, VertexKind.CROSSING):
+            rows = np.flatnonzero(curved & self._beyond & (eset.kinds == kind))
+            ways = list(combinations(range(d), 2 if kind == VertexKind.CORNER else 1))
+            if len(rows) == 0 or not ways:
+                continue
+            found = [self._settled(rows, kind, np.eye(d)[list(way)]) for way in ways]
+            place = embed(eset.setting, eset.points.z[rows], eset.points.p[rows])
+            moves = [embed(eset.setting, at.z, at.p) - place for at in found]
+            away = np.linalg.norm(moves, axis=2)
+            away[~np.stack([at.found for at in found])] = np.inf
+            best = away.argmin(axis=0)
+            for k, at in enumerate(found):
+                yield rows[best == k], at.take(np.flatnonzero(best == k))
+
+    def _settled(self, rows: Items, kind: VertexKind, span: Float[np.ndarray, "k d"]) -> Pinned:
+        """Points on a fold, constraint or crossing in the box, where some parameters may move."""
+        eset = self.eset
+        z, p = eset.points.z[rows].copy(), self._clipped[rows]
+        fold = kind in {VertexKind.FOLD, VertexKind.CORNER}
+        cap = kind in {VertexKind.CAP, VertexKind.CORNER}
+        place = embed(eset.setting, z, p)
+        spans = np.tile(span, (len(rows), 1, 1))
+        crossing = kind == VertexKind.CROSSING
+        aim = Aim(eset.setting, fold, cap, spans, place, place[:, None][:, :0], crossing=crossing)
+        at = correct_points(aim, z, p, np.zeros(len(rows)))
+        free = at.p[:, eset.setting.free]
+        at.found[~self.box.holds(free, ON_SIDE)] = False
+        at.p[:, eset.setting.free] = np.clip(free, self.box.lower, self.box.upper)
+        return at
+
+    def _coinciding(self, points: States) -> Pairs:
+        """Vertices that have come to the same point of a side."""
+        box, at = self.box, points.p[:, self.eset.setting.free]
+        rows = np.flatnonzero(((at <= box.lower) | (at >= box.upper)).any(axis=1))
+        place = embed(self.eset.setting, points.z[rows], points.p[rows])
+        return np.asarray(rows[cKDTree(place).query_pairs(SAME_VERTEX, output_type="ndarray")])
+
+    def _swallowed(self, points: States, found: VertexFlags) -> Pairs:
+        """Vertices that cannot go to a side because a fold or crossing lies between, and this."""
+        eset, free = self.eset, self.eset.setting.free
+        lost, met = ~found, found & are_singular(eset.kinds) & self._beyond
+        near = eset.cells[lost[eset.cells].any(axis=1) & met[eset.cells].any(axis=1)]
+        pairs = np.array(
+            [(a, b) for cell in near.tolist() for a in cell if lost[a] for b in cell if met[b]], int
+        ).reshape(-1, 2)
+        gap = np.abs(self._clipped[pairs[:, 0]] - points.p[pairs[:, 1]])[:, free]
+        moved = np.maximum(self.box.lower - eset.box.lower, eset.box.upper - self.box.upper)
+        return np.asarray(pairs[(gap <= 2.0 * moved).all(axis=1)])
+
+
+def _groups(pairs: Pairs, count: int) -> list[Int[np.ndarray, "_ 2"]]:
+    """Pairs of vertices that hang together."""
+    graph = coo_array((np.ones(len(pairs)), pairs.T), shape=(count, count))
+    _, label = connected_components(graph, directed=False)
+    own = label[pairs[:, 0]]
+    return [pairs[own == each] for each in np.unique(own)]
+
+
+def _one_of_same(whole: Complex, same: Pairs) -> VertexNumbers:
+    """For each vertex the one that stands for it, a singular one if there is any."""
+    count = len(whole.points)
+    graph = coo_array((np.ones(len(same)), same.T), shape=(count, count))
+    _, label = connected_components(graph, directed=False)
+    order = np.argsort(~are_singular(whole.kinds), kind="stable")
+    _, first = np.unique(label[order], return_index=True)
+    return np.asarray(order[first][label])
+
+
+def _folds_over(whole: Complex, same: Pairs) -> bool:
+    """Whether more facets have more than two cells if vertices are one."""
+    cells = _one_of_same(whole, same)[whole.cells]
+    crowded = [(adjacency(own).counts > 2).sum() for own in (whole.cells, cells[_distinct(cells)])]
+    return bool(crowded[1] > crowded[0])
+
+
+def _welded(whole: Complex, same: Pairs) -> Complex:
+    """Cells in which vertices that are the same point are one."""
+    if len(same) == 0:
+        return whole
+    count, one = len(whole.points), _one_of_same(whole, same)
+    kept = _distinct(one[whole.cells])
+    used, cells = np.unique(one[whole.cells[kept]], return_inverse=True)
+    number = np.full(count, -1)
+    number[used] = np.arange(len(used))
+    marked = {}
+    for name in ("folds", "caps", "crossings"):
+        facets = number[one[getattr(whole, name)]]
+        marked[name] = facets[(facets >= 0).all(axis=1) & _distinct(facets)]
+    columns = {name: getattr(whole, name)[used] for name in ("kinds", "index", "grid_vertex")}
+    return replace(
+        whole, points=whole.points[used], **columns, cells=cells.reshape(-1, whole.cells.shape[1]),
+        cell_index=whole.cell_index[kept], **marked,
+    )  # fmt: skip
+
+
+def _distinct(rows: Facets) -> ItemFlags:
+    """Which rows have no vertex twice."""
+    ordered = np.sort(rows, axis=1)
+    return np.asarray((ordered[:, 1:] != ordered[:, :-1]).all(axis=1))
+
+
+def _cut_off(eset: EquilibriumSet, box: Box, axis: int, *, lower: bool) -> EquilibriumSet:
+    """The set without what still lies beyond a side, cut along it."""
+    bound, sign = (box.lower[axis], -1.0) if lower else (box.upper[axis], 1.0)
+
+    def excess(at: Vertices | States) -> Float[np.ndarray, " n"]:
+        return np.asarray(sign * (at.p[:, eset.setting.free[axis]] - bound))
+
+    beyond = excess(eset.points)
+    beyond[np.abs(beyond) <= ON_SIDE * (box.upper - box.lower)[axis]] = 0.0
+    if not (beyond > 0.0).any():
+        return eset
+    ranges = dict(zip(box.names, zip(box.lower, box.upper, strict=True), strict=True))
+    ranges[box.names[axis]] = (eset.box.lower[axis], eset.box.upper[axis])
+    own = replace(eset, box=Box(**ranges))
+    cut = cut_along(own, beyond[sheets_of(own).origin], excess)
+    inside = (cut.values[cut.recut.cells] < 0.0).any(axis=1)  # where none was cut, they stay whole
+    out = part_of(cut.recut, inside, np.zeros(len(cut.recut.points), bool), cut.lost)
+    return replace(out, box=eset.box)
