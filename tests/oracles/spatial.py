@@ -9,6 +9,7 @@ from scipy.linalg import eigh, null_space
 
 from equimorph.structures.rod.ends import FREE
 from equimorph.structures.rod.general_field_kernels import KAPPA, MOMENT
+from equimorph.structures.rod.general_fields import GeneralFields
 from equimorph.structures.rod.profiles import at_nodes, profile
 
 E1, E3 = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
@@ -70,9 +71,10 @@ def fine_margin(rod, torsion, lateral, z, p):
     ½ ∫ C (φ' − κψ)² + A (ψ' + κφ)² − M (φ (ψ' + κφ) − ψ (φ' − κψ)) − N ψ² + M' φψ ds.
     """
     mechanics, mesh = rod.mechanics, rod.mesh
-    model, reference = mechanics.model, mechanics.fine_reference
+    model, everywhere = mechanics.model, GeneralFields(mechanics.model)
+    reference = everywhere.reference
     y = mechanics.scalars(z[None], p[None])
-    fields = mechanics.fine_fields(mechanics.nodal_angles(z[None], p[None]), y)[0]
+    fields = everywhere.everywhere(mechanics.nodal_angles(z[None], p[None]), y)[0]
     along, across = (
         np.einsum("j,jei->ei", y[0], rows) for rows in (model.fine.along, model.fine.across)
     )

@@ -305,7 +305,7 @@ def _set_stage(states: States, board: _Board | _Landscape) -> _Stage:
         draw_triad(left, around.viewpoint, states.structure.length_unit)
     Surroundings(states[[0, -1]]).draw_shapes(left, [_START_AND_GOAL] * 2, 1, linewidths=2.0)
     board.draw(right)
-    shape = around.moving_shape(left, style.INDEX_COLOURS[0], 4, 3.0)
+    shape = around.moving_shape(left, style.INDEX_COLOURS[0])
     (travelled,) = right.plot([], [], color=style.ROUTE_COLOUR, linewidth=2.4, zorder=8)
     (point,) = right.plot([], [], "o", color=style.INK, markeredgecolor="white", ms=7, zorder=9)
     parts = around.moving_parts(left)

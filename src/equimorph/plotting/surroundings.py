@@ -188,12 +188,12 @@ class Surroundings:
         lines = LineCollection(list(self.outlines), colors=colours, zorder=zorder, **look)
         ax.add_collection(lines)
 
-    def moving_shape(self, ax: Axes, colour: Any, zorder: float, width: float) -> Moving:
+    def moving_shape(self, ax: Axes, colour: Any) -> Moving:
         """The shape, to be placed state by state; limits must be final."""
         if self.viewpoint is None:
-            return _line(ax, self.outlines, color=colour, linewidth=width, zorder=zorder)
+            return _line(ax, self.outlines, color=colour, linewidth=3.0, zorder=4)
         picture = Picture(self.viewpoint, ax, ax.figure.dpi)
-        return Moving(*moving_solid(picture, self.states, self.size, colour, zorder))
+        return Moving(*moving_solid(picture, self.states, self.size, colour, 4))
 
     def label_axes(self, ax: Axes) -> None:
         """Axes of the plane with their unit; of space the directions x, y, z and a scale."""

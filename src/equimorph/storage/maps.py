@@ -41,14 +41,14 @@ def write_map_group(group: h5py.Group, amap: ActuatorMap) -> None:
     put(
         group,
         "curve_point",
-        _stack_curves(curves, "points", 2),
+        _stack_curves(curves, "points"),
         ["point", "coordinate"],
         "settings",
     )
     put(
         group,
         "curve_value",
-        _stack_curves(curves, "values", 2),
+        _stack_curves(curves, "values"),
         ["point", "side"],
         "lower and higher",
         amap.unit,
@@ -98,10 +98,8 @@ def _about(amap: ActuatorMap) -> dict[str, Any]:
     return about
 
 
-def _stack_curves(
-    curves: tuple[MapCurve, ...], name: str, columns: int
-) -> Float[np.ndarray, "points columns"]:
-    return np.concatenate([np.zeros((0, columns)), *(getattr(c, name) for c in curves)])
+def _stack_curves(curves: tuple[MapCurve, ...], name: str) -> Float[np.ndarray, "points 2"]:
+    return np.concatenate([np.zeros((0, 2)), *(getattr(c, name) for c in curves)])
 
 
 def _curves(group: h5py.Group, structure: Structure) -> tuple[MapCurve, ...]:

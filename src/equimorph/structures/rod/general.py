@@ -28,7 +28,6 @@ from equimorph.structures.equations import (
     Solver,
 )
 from equimorph.structures.material_points import MaterialPoints, SprungPoints
-from equimorph.structures.rod.discretisation import Reference
 from equimorph.structures.rod.general_fields import GeneralFields
 from equimorph.structures.rod.general_kernels import linearise_lanes, second_lanes
 from equimorph.structures.rod.general_step_kernels import advance_lanes
@@ -105,15 +104,6 @@ class GeneralMechanics(JointEquations, PlanarMechanics):
     @cached_property
     def _fields(self) -> GeneralFields:
         return GeneralFields(self.model)
-
-    @property
-    def fine_reference(self) -> Reference:
-        """Rule on whose nodes `fine_fields` gives fields."""
-        return self._fields.reference
-
-    def fine_fields(self, theta: Nodal, y: Scalars) -> Float[np.ndarray, "lanes elements 5 fine"]:
-        """θ, κ, x, y and the moment at the nodes of a finer rule in every element."""
-        return self._fields.everywhere(theta, y)
 
     def fields(
         self, z: Lanes, p: Parameters, s: Float[np.ndarray, " points"]

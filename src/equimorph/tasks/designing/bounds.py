@@ -84,7 +84,7 @@ class RouteExtreme:
             pieces.append(pass_piece(self, structure, passing.point, passing.reach))
         return Answer(found.value, tuple(pieces), self._bounds(start, goal), (start, goal), found)
 
-    def set_of(self, structure: Structure, checks: int = 0) -> EquilibriumSet:
+    def set_of(self, structure: Structure) -> EquilibriumSet:
         """Equilibrium set of a structure over the same box."""
         given = self.eset
         if structure.signature == given.structure.signature:
@@ -92,7 +92,7 @@ class RouteExtreme:
         within = carry_over(given.constraints, given.structure, structure)
         return equilibrium_set(
             structure, given.box, fixed=given.fixed, within=within, intervals=given.intervals,
-            checks=checks,
+            checks=0,
         )  # fmt: skip
 
     def _on(self, structure: Structure) -> tuple[Extreme, tuple[Constraint, ...]]:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from equimorph.arrays import Float, Int
-from equimorph.equilibria import Event, EventKind, Leg, Path, TraceOptions, lift
+from equimorph.equilibria import Event, EventKind, Leg, Path, lift
 from equimorph.equilibria.settle import distances
 from equimorph.model import Constraint, Descriptor, are_feasible, names_of
 from equimorph.structures import State, States
@@ -18,6 +18,7 @@ from equimorph.tasks.motion.course import (
     linearise,
     shortest_change,
 )
+from equimorph.tasks.route import FINE
 
 DENSE = 12
 """Legs from which on blocks of them are cheaper than one continuation each."""
@@ -32,9 +33,7 @@ CLOSEST = 1e-3
 """Share of a leg below which it is not halved any more."""
 
 
-def path_by_blocks(
-    course: Course, start: State, within: tuple[Constraint, ...], options: TraceOptions
-) -> Path:
+def path_by_blocks(course: Course, start: State, within: tuple[Constraint, ...]) -> Path:
     """Follow a course in blocks; where these end, by continuation to the next corner."""
     parts, here, time = [], start, 0.0
     end = Event(EventKind.ARRIVED, start, 0.0)
@@ -44,7 +43,7 @@ def path_by_blocks(
         here, time = stretch.states[-1], float(stretch.times[-1])
         if time < course.legs:
             corner = float(int(time) + 1)
-            path = lift(here, _rest(course, time), within=within, options=options)
+            path = lift(here, _rest(course, time), within=within, options=FINE)
             times = time + path.at * (corner - time)
             parts.append((path.states.z, path.states.p, times))
             here, end = path.end.state, path.end

@@ -227,7 +227,7 @@ class _Motion:
             return self._redundant_path()
         if len(self.legs) >= DENSE and same_descriptors(self.legs):
             check_start(self.start, every)
-            return path_by_blocks(self.course, self.start, every, FINE)
+            return path_by_blocks(self.course, self.start, every)
         freed = [_free_actuators(leg, self.names) for leg in self.legs]
         path = lift(self.start, freed, within=every)
         return lift(self.start, freed, within=every, options=FINE) if path.arrived else path

@@ -353,11 +353,9 @@ def chance_of_missing(
     return float(bdtr(ceil(length / radius) - 1, rounds, meets))
 
 
-def narrowest_excluded(
-    actuators: int, rounds: int, batch: int, reach: float, length: float = 1.0
-) -> float | None:
-    """Least width of corridors that are missed with a probability of 5 % at most; None if none."""
+def narrowest_excluded(actuators: int, rounds: int, batch: int, reach: float) -> float | None:
+    """Least width of corridors of length 1 missed with a chance of 5 % at most; None if none."""
     for part in range(1, PARTS + 1):
-        if chance_of_missing(part / PARTS, length, actuators, rounds, batch, reach) <= CHANCE:
+        if chance_of_missing(part / PARTS, 1.0, actuators, rounds, batch, reach) <= CHANCE:
             return part / PARTS
     return None
