@@ -181,7 +181,7 @@ def _all(states: States, scales: Scales) -> Iterator[Pictures]:
 
 def _modes(centred: Pictures, tolerance: float) -> Rows:
     """As few principal components as give all pictures within a tolerance, largest number 1."""
-    _, _, rows = np.linalg.svd(centred, full_matrices=False)
+    rows = _components(centred)
     rest, count = centred.copy(), 0
     while count < len(rows) and np.abs(rest).max(initial=0.0) > tolerance:
         some = rows[count : count + _MODES_AT_ONCE]
@@ -189,6 +189,19 @@ def _modes(centred: Pictures, tolerance: float) -> Rows:
         count += len(some)
     kept = rows[: max(count, 1)]
     return np.asarray(kept / np.abs(kept).max(axis=1, keepdims=True))
+
+
+def _components(centred: Pictures) -> Rows:
+    """Principal components, the largest first.
+
+    They are eigenvectors of the products of the pictures' numbers, or of the pictures if these are
+    fewer: that takes a tenth of the time of singular values, and loses components far below
+    `FIDELITY` only.
+    """
+    if len(centred) >= centred.shape[1]:
+        return np.linalg.eigh(centred.T @ centred)[1].T[::-1]
+    of_pictures = np.linalg.eigh(centred @ centred.T)[1][:, ::-1]
+    return np.linalg.qr(centred.T @ of_pictures)[0].T
 
 
 def _project(centred: Pictures, modes: Rows) -> tuple[Coefficients, Values]:
