@@ -72,9 +72,10 @@ $(RUNTIME): pyproject.toml
 	$(INSTALL) .
 	touch $(RUNTIME)
 
+# What `make run` needs is compiled meanwhile, from the sources: see `kernels`.
 $(INSTALLED): $(RUNTIME)
-	$(INSTALL) '.[dev]'
-	touch $(INSTALLED)
+	PYTHONPATH=src $(BIN)/python -m equimorph.cli compile examples/arch.toml & \
+	    $(INSTALL) '.[dev]' && touch $(INSTALLED); status=$$?; wait; exit $$status
 
 .venv/.docs: $(INSTALLED)
 	$(INSTALL) '.[dev,docs]'

@@ -14,6 +14,7 @@ import pytest
 
 from equimorph.cli import main, run
 from equimorph.cli.output import Output
+from equimorph.linalg.compile_ahead import known_calls
 from equimorph.study import Outcome
 from studies import SPRING, draw_dots, with_answers_of
 from typecheck import unchecked
@@ -535,3 +536,19 @@ def test_kernels_are_compiled_first_if_one_is_missing(kept, compiles, tmp_path, 
         run.run_and_show(tmp_path, tmp_path, Output(quiet=True), replace=False)
     assert done == ([calls] if compiles else [])
     assert behind == [loop]
+
+
+def test_kernels_of_studies_are_compiled_before_and_loops_behind(monkeypatch):
+    """Kernels that two studies need are asked for once; without a study all are compiled."""
+    known = known_calls()
+    loops = [each for each in known if each.is_loop]
+    others = [each for each in known if each.is_common]
+    done, behind = list[object](), list[object]()
+    monkeypatch.setattr(run, "read_problem", lambda _: (None, None, None))
+    monkeypatch.setattr(run, "calls_of", lambda _: [*loops, *others])
+    monkeypatch.setattr(run, "compile_ahead", lambda calls: done.append(list(calls)))
+    monkeypatch.setattr(run, "compile_behind", behind.extend)
+    run.compile_all_of([Path("a.toml"), Path("b.toml")])
+    assert (done, behind) == ([others], loops)
+    run.compile_all_of([])
+    assert done[1] == known

@@ -209,6 +209,18 @@ def run(
     raise typer.Exit(_worst(0 if allow_refused and code == REFUSED else code for code in codes))
 
 
+@app.command("compile")
+def compile_kernels(
+    files: Annotated[
+        list[Path] | None, typer.Argument(help="Study files; all kernels without.", metavar="FILE")
+    ] = None,
+) -> None:
+    """Compile the kernels that studies need, or all, so that no run has to wait for it."""
+    from equimorph.cli.run import compile_all_of
+
+    compile_all_of(files or [])
+
+
 @app.command()
 def replay(
     file: Annotated[Path, typer.Argument(help="Schedule, a table with its sidecar.")],

@@ -1,12 +1,13 @@
 """``equimorph run``: run a study and show its answers on the screen."""
 
+from collections.abc import Iterable
 from pathlib import Path
 
 from rich.markup import escape
 from rich.table import Table
 
 from equimorph.cli.output import Output
-from equimorph.linalg.compile_ahead import calls_of, compile_ahead, compile_behind
+from equimorph.linalg.compile_ahead import calls_of, compile_ahead, compile_behind, known_calls
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Descriptor, Workers
 from equimorph.structures import States
@@ -43,6 +44,16 @@ def run_and_show(
     if output.as_json:
         output.write_data({"study": str(file), "report": str(report), **summary(outcome)})
     return bool(outcome.refused)
+
+
+def compile_all_of(files: Iterable[Path]) -> None:
+    """Compile the kernels that studies need, with their loops behind; all where none is given."""
+    calls = dict.fromkeys(each for file in files for each in calls_of(read_problem(file)[2]))
+    if calls:
+        compile_ahead(each for each in calls if not each.is_loop)
+        compile_behind(each for each in calls if each.is_loop)
+    else:
+        compile_ahead(known_calls())
 
 
 def _show(outcome: Outcome, output: Output) -> None:
