@@ -5,10 +5,12 @@ from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from multiprocessing import get_context
 
+import numpy as np
 import pytest
 
 import equimorph as em
-from equimorph.model.journal import LEAST, MOST, cut_rows
+from equimorph.columns import Columns
+from equimorph.model.journal import LEAST, MOST, cut_rows, map_rows
 from same_records import assert_equal
 from typecheck import unchecked
 
@@ -23,6 +25,13 @@ class Here:
         for chunk in chunks:
             self.chunks.append(len(next(iter(vars(chunk).values()))))
             yield function(chunk)
+
+
+@dataclasses.dataclass(frozen=True)
+class Numbered(Columns):
+    """Rows with a number each."""
+
+    number: np.ndarray
 
 
 class Cancels:
@@ -114,6 +123,15 @@ def test_chunks_are_neither_small_nor_large():
         assert sum(len(range(count)[cut]) for cut in cuts) == count
         assert all(cut.stop - cut.start <= MOST for cut in cuts)
         assert all(cut.stop - cut.start >= min(count, LEAST) for cut in cuts)
+
+
+def test_finished_chunks_are_counted_from_one():
+    """What is reported after each of three chunks; the rows come back in their order."""
+    rows, reports = Numbered(np.arange(6)), []
+    cuts = [slice(0, 2), slice(2, 3), slice(3, 6)]
+    found = map_rows(lambda part: part, rows, cuts, Here(), reports.append)
+    assert reports == [1, 2, 3]
+    assert found.number.tolist() == list(range(6))
 
 
 def test_what_cannot_map_is_refused():

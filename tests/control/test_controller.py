@@ -8,7 +8,9 @@ import pytest
 
 import equimorph as em
 from equimorph.control.estimate import Measurement, fit_loads
-from equimorph.control.likely_loads import positions
+from equimorph.control.likely_loads import LikelyLoads, positions
+from equimorph.structures import join_states
+from equimorph.tasks.planning.network import Demands
 from oracles.wandering_load import Plant, PlantInMuJoCo, wandering
 from sets import arch_set
 from typecheck import unchecked
@@ -275,3 +277,18 @@ def test_routes_have_few_corners():
     assert belief.status == em.ControlStatus.FOLLOWING
     assert len(belief.way_points) <= 8
     assert max(point["x_l"] for point in belief.way_points) > 1.0
+
+
+def test_places_are_known_under_the_estimated_loads_first(spring_set):
+    """Three places under five loads: the estimated one, by its spread, and by a jump more."""
+    spring, one = spring_set.structure, np.ones(1)
+    demands = Demands.of(spring, "length", (), 0.0)
+    at = positions(spring, ["F"])
+    likely = LikelyLoads.around(at, 0.1 * one, 0.01 * one, 0.02 * one, demands)
+    states = join_states(
+        spring, [min(spring_set.at(x_l=x).stable, key=spring.angle) for x in (0.7, 0.9, 1.1)]
+    )
+    found = likely.under(states)
+    np.testing.assert_allclose(np.unique(found.states["F"]), [0.07, 0.09, 0.1, 0.11, 0.13])
+    np.testing.assert_allclose(found.estimated["F"], 0.1)
+    np.testing.assert_allclose(found.estimated["x_l"], states["x_l"])

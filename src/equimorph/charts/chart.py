@@ -25,6 +25,7 @@ from equimorph.charts.singular_pairs import SingularPairs
 from equimorph.charts.twins import add_twins
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet, Level, singular_set
+from equimorph.manifold.complex.equilibrium_set import check_cells
 from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.geometry.topology import facets_of
 from equimorph.model import Descriptor
@@ -364,9 +365,3 @@ class DescriptorChart(Chart):
         spread = np.maximum(np.ptp(cells.values, axis=0), 1e-300)
         sizes = np.abs(cells.turn[some]) / np.prod(spread)
         return np.asarray(sizes * len(cells.numbers))
-
-
-def check_cells(eset: EquilibriumSet) -> None:
-    """Refuse a set without cells."""
-    if len(eset.cells) == 0:
-        raise InputError("`eset` must have cells; got an empty set.")

@@ -8,7 +8,6 @@ import numpy as np
 from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Bool, CellNumbers, Int, ItemValues, Pairs
 from equimorph.charts.atlas import Atlas
-from equimorph.charts.chart import check_cells
 from equimorph.charts.conflicts import conflicts_of, least_cut
 from equimorph.charts.coordinates import Coordinates, coordinates_of
 from equimorph.charts.location import Cells
@@ -19,6 +18,7 @@ from equimorph.charts.preparation import (
     flip_inverted_triangles,
 )
 from equimorph.manifold import EquilibriumSet
+from equimorph.manifold.complex.equilibrium_set import check_cells
 from equimorph.manifold.complex.excerpts import Excerpt, excerpt_of
 from equimorph.manifold.complex.marked_complex import Fabric, squared_sides
 from equimorph.manifold.complex.vertices import Vertices, free_vertices

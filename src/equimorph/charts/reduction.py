@@ -12,7 +12,7 @@ import numpy as np
 from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Bool, Int, Points, VertexFlags
 from equimorph.charts.barriers import Barrier, barriers_of, gaps_of
-from equimorph.charts.chart import Chart, Charted, PointStatus, check_cells
+from equimorph.charts.chart import Chart, Charted, PointStatus
 from equimorph.charts.coordinates import Coordinates, coordinates_of
 from equimorph.charts.domain import Domain, typical_extent
 from equimorph.charts.location import Cells
@@ -22,6 +22,7 @@ from equimorph.charts.preparation import cut_along_crossings, with_cusp_vertices
 from equimorph.charts.rules import Rule, Scores, rule_of
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
+from equimorph.manifold.complex.equilibrium_set import check_cells
 from equimorph.manifold.complex.kept_tables import from_cache
 from equimorph.model import Constraint, Descriptor
 from equimorph.structures import States

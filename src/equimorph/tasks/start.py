@@ -43,12 +43,6 @@ def check_stable(name: str, state: State) -> None:
         raise InputError(f"`{name}` must be stable; got a state of index {state.index}.")
 
 
-def check_cells(eset: EquilibriumSet) -> None:
-    """Raise `InputError` if a set is empty."""
-    if not len(eset.cells):
-        raise InputError("`eset` must have cells; got an empty set.")
-
-
 def check_two_parameters(eset: EquilibriumSet, name: str = "eset") -> None:
     """Raise `InputError` unless the set of the argument `name` is over two parameters."""
     if len(eset.names) != 2:

@@ -286,3 +286,9 @@ class EquilibriumSet(Tabular):
 def _check_names(names: tuple[str, ...], at: Mapping[str, object]) -> None:
     if set(at) != set(names):
         raise InputError(f"`at` must give {' and '.join(names)}; got {', '.join(at) or 'nothing'}.")
+
+
+def check_cells(eset: EquilibriumSet) -> None:
+    """Refuse a set without cells."""
+    if len(eset.cells) == 0:
+        raise InputError("`eset` must have cells; got an empty set.")

@@ -10,6 +10,7 @@ from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Bool
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
+from equimorph.manifold.complex.equilibrium_set import check_cells
 from equimorph.manifold.queries.nearest import SetPoints, local_minima, points_at_vertices
 from equimorph.model import Constraint, Descriptor, Schedule
 from equimorph.structures import State, States, join_states
@@ -33,7 +34,6 @@ from equimorph.tasks.stable_part import (
     stable_vertices,
 )
 from equimorph.tasks.start import (
-    check_cells,
     check_equilibrium,
     check_fixed_parameters,
     check_stable,

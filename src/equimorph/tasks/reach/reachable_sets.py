@@ -11,6 +11,7 @@ from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Bool, Float, Int
 from equimorph.errors import InputError
 from equimorph.manifold import Division, EquilibriumSet, divided, part, refine
+from equimorph.manifold.complex.equilibrium_set import check_cells
 from equimorph.manifold.complex.kept_tables import adjacency_of
 from equimorph.manifold.geometry.topology import labels
 from equimorph.model import Constraint, Descriptor
@@ -18,7 +19,7 @@ from equimorph.structures import State, States
 from equimorph.tasks.reach.query import Answer, query_region
 from equimorph.tasks.reach.regions import BoundaryPiece, Region
 from equimorph.tasks.stable_part import cell_near, stable_piece
-from equimorph.tasks.start import check_cells, check_stable
+from equimorph.tasks.start import check_stable
 
 FINER = (0.1, 0.03)
 """Accuracies of a set, tried in turn if edges could not be cut."""

@@ -12,6 +12,7 @@ from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Float, Int, Values
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet, Level
+from equimorph.manifold.complex.equilibrium_set import check_cells
 from equimorph.manifold.queries.nearest import SetPoints, local_minima, points_at_vertices
 from equimorph.model import NOT_KEPT, Constraint, Descriptor, Schedule, worst_relative_excess
 from equimorph.structures import State, States, join_states
@@ -27,7 +28,6 @@ from equimorph.tasks.shapes.prediction import (
     states_with_values,
 )
 from equimorph.tasks.stable_part import feasible_vertices, stable_vertices
-from equimorph.tasks.start import check_cells
 from equimorph.tolerances import SAME_STATE
 
 AT_EDGE = 1e-9
