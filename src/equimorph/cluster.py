@@ -151,10 +151,7 @@ class DaskWorkers:
 def compute(task: bytes, expected: dict[str, str]) -> bytes:
     """Compute a chunk, the pickle of a function and of its argument, on a worker.
 
-    Raises
-    ------
-    InputError
-        If the worker has other versions than the process that asks.
+    Refused if the worker has other versions than the process that asks.
     """
     found = versions()
     for name, wanted in expected.items():

@@ -172,11 +172,8 @@ class Coordinates(Scalars):
 def coordinates_of(eset: EquilibriumSet, chosen: Sequence[Descriptor | str]) -> Coordinates:
     """Coordinates by descriptors, or by names of free parameters or of descriptors.
 
-    Raises
-    ------
-    InputError
-        If there are not as many as free parameters, two are equal, or one is a fixed parameter or
-        an unknown name.
+    Refused if there are not as many as free parameters, two are equal, or one is a fixed parameter
+    or an unknown name.
     """
     d = len(eset.names)
     if isinstance(chosen, str) or len(chosen) != d:

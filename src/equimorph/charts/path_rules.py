@@ -77,13 +77,7 @@ class Unloaded:
 
     @classmethod
     def of(cls, eset: EquilibriumSet, parameter: str) -> "Unloaded":
-        """Natural states of a set.
-
-        Raises
-        ------
-        InputError
-            If the parameter does not vanish in natural states.
-        """
+        """Natural states of a set; refused if the parameter does not vanish in natural states."""
         return from_cache(eset, ("unloaded", parameter), lambda: cls._of(eset, parameter))
 
     @classmethod

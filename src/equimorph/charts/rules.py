@@ -167,13 +167,7 @@ def by_score(function: Callable[[States], Scores]) -> Rule:
 
 
 def rule_of(prefer: Rule | Callable[[States], Scores]) -> Rule:
-    """Return a rule, or a function of states as one.
-
-    Raises
-    ------
-    InputError
-        For anything else.
-    """
+    """Return a rule, or a function of states as one; refused for anything else."""
     if isinstance(prefer, Rule):
         return prefer
     if callable(prefer):

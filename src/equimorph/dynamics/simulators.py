@@ -16,10 +16,7 @@ from equimorph.structures import Frame, Rod, SpatialRod, State, Truss
 def model_of(start: State, simulator: str, links: int) -> Model:
     """The structure of a state as a simulator sees it.
 
-    Raises
-    ------
-    InputError
-        If the simulator does not cover it, or is not installed; there is no silent fall-back.
+    Refused if the simulator does not cover it, or is not installed; there is no silent fall-back.
     """
     structure = start.structure
     if simulator == "own":

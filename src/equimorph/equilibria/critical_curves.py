@@ -88,13 +88,7 @@ class CriticalCurve:
 def both_ways(
     kind: str, locus: Locus, state: State, watches: list[Watch], options: TraceOptions | None
 ) -> CriticalCurve:
-    """Follow a locus from a state in both directions.
-
-    Raises
-    ------
-    InputError
-        If the state is not on the locus.
-    """
+    """Follow a locus from a state in both directions; refused if the state is not on the locus."""
     options = options or TraceOptions(largest_step=0.2)
     x = locus.join(state.z[None], state.p[None])
     start, found = nearest(locus, x)

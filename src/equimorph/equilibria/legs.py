@@ -32,13 +32,7 @@ AT_START = 1e-8
 
 
 def legs_of(to: Leg | Sequence[Leg]) -> list[Leg]:
-    """All legs of `to`.
-
-    Raises
-    ------
-    InputError
-        If the list is empty, or holds anything but legs.
-    """
+    """All legs of `to`; refused if the list is empty, or holds anything but legs."""
     legs = [to] if isinstance(to, Mapping) or callable(to) else list(to)
     for leg in legs:
         if not (isinstance(leg, Mapping) or callable(leg)):
@@ -135,12 +129,9 @@ class Prepared:
 def prepare_leg(states: States, leg: Leg) -> Prepared:
     """Curve of a leg from given states.
 
-    Raises
-    ------
-    InputError
-        For an unknown parameter, a value without meaning, numbers of values that are not those of
-        the states, a curve that is not smooth or begins elsewhere, or numbers of descriptors and
-        unknown parameters that differ.
+    Refused for an unknown parameter, a value without meaning, numbers of values that are not those
+    of the states, a curve that is not smooth or begins elsewhere, or numbers of descriptors and
+    unknown parameters that differ.
     """
     structure, here = states.structure, states.p
     first = leg(0.0) if callable(leg) else leg

@@ -116,10 +116,7 @@ def interpolate(
 def approximate(function: Function, lanes: int, scales: Float[np.ndarray, " columns"]) -> Pieces:
     """Polynomials that agree with a smooth function to round-off, in as few pieces as it takes.
 
-    Raises
-    ------
-    InputError
-        If 64 pieces do not suffice.
+    Refused if 64 pieces do not suffice.
     """
     between = np.cos(np.pi * np.arange(1, DEGREE + 1) / (DEGREE + 1))
     count = 1

@@ -65,10 +65,7 @@ _BARE = re.compile(r"[A-Za-z0-9_-]+")
 def study_text(eset: EquilibriumSet, title: str) -> str:
     """Title, structure and set as a study file, to which the page adds routes.
 
-    Raises
-    ------
-    InputError
-        If the structure cannot be written down, as with loads that are functions.
+    Refused if the structure cannot be written down, as with loads that are functions.
     """
     structure = {k: v for k, v in eset.structure.identity().items() if v is not None}
     sides = zip(eset.names, eset.box.lower.tolist(), eset.box.upper.tolist(), strict=True)

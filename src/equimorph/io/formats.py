@@ -62,10 +62,7 @@ POLYLINES = ("LWPOLYLINE", "POLYLINE")
 def read_dxf(path: Path) -> Drawing:
     """Read the lines of the model space.
 
-    Raises
-    ------
-    InputError
-        If the file cannot be read, a polyline has arcs, or ezdxf is not installed.
+    Refused if the file cannot be read, a polyline has arcs, or ezdxf is not installed.
     """
     ezdxf = load_package("ezdxf", "geometry", "read_lines")
     try:
@@ -106,10 +103,7 @@ POLYGONS = (5, 7, 9)
 def read_vtk(path: Path) -> Drawing:
     """Read lines and polylines; of meshes without lines the edges of their polygons.
 
-    Raises
-    ------
-    InputError
-        If the file holds no polygonal data or unstructured grid, or pyvista is not installed.
+    Refused if the file holds no polygonal data or unstructured grid, or pyvista is not installed.
     """
     pyvista = load_package("pyvista", "geometry", "read_lines")
     try:
@@ -161,10 +155,7 @@ class _Element:
 def read_ply(path: Path) -> Drawing:
     """Read edges; of meshes without edges those of their faces.
 
-    Raises
-    ------
-    InputError
-        If it is no PLY file, or damaged.
+    Refused if it is no PLY file, or damaged.
     """
     content = path.read_bytes().replace(b"end_header\r\n", END)
     head, found, body = content.partition(END)
@@ -248,10 +239,7 @@ def _numbers(body: bytes, order: str) -> Any:
 def read_compas(path: Path) -> Drawing:
     """Read all graphs, meshes, lines and polylines, at any depth of the file.
 
-    Raises
-    ------
-    InputError
-        If it is no JSON, or an object of COMPAS lacks what its kind has.
+    Refused if it is no JSON, or an object of COMPAS lacks what its kind has.
     """
     try:
         content = json.loads(path.read_text(encoding="utf-8"))

@@ -48,10 +48,7 @@ EVEN = "pad=ceil(iw/2)*2:ceil(ih/2)*2"
 def film_file(path: str | FilePath) -> FilePath:
     """Return the path of a film that can be written here.
 
-    Raises
-    ------
-    InputError
-        If it is neither a GIF nor, with ffmpeg at hand, an MP4.
+    Refused if it is neither a GIF nor, with ffmpeg at hand, an MP4.
     """
     file = FilePath(path)
     kinds = suffixes()

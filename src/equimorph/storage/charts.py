@@ -72,10 +72,7 @@ def load_chart(path: str | Path) -> Chart | Atlas:
 def write_chart(group: h5py.Group, chart: Chart | Atlas) -> None:
     """Write a chart or an atlas with its set into an empty group.
 
-    Raises
-    ------
-    InputError
-        If the chart belongs to an atlas, or is a reduction by a function or nearest to a state.
+    Refused if the chart belongs to an atlas, or is a reduction by a function or nearest to a state.
     """
     eset = chart.eset
     about: dict[str, Any] = {"kind": type(chart).__name__}

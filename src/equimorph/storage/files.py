@@ -24,10 +24,7 @@ FINGERPRINT = 32
 def replacing(path: Path) -> Generator[Path]:
     """Give a temporary path in the folder of `path`, and move it there when the block succeeds.
 
-    Raises
-    ------
-    InputError
-        If the folder cannot be written, or is full.
+    Refused if the folder cannot be written, or is full.
     """
     try:
         handle, name = tempfile.mkstemp(prefix=f".{path.name}.", suffix=".partial", dir=path.parent)

@@ -83,10 +83,8 @@ class JournalFile:
     def begin(self, question: str) -> None:
         """Go to the first entry of a journal of this question.
 
-        Raises
-        ------
-        InputError
-            If the file is no journal or that of another question, is in use, or cannot be written.
+        Refused if the file is no journal or that of another question, is in use, or cannot be
+        written.
         """
         head = MARK + checksum(question.encode()).encode() + b"\n"
         with self._writable():

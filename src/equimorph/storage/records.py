@@ -92,10 +92,7 @@ LAYOUTS = {
 def write_record(group: h5py.Group, value: Any) -> None:
     """Write a result into an empty group, which then names its schema and version.
 
-    Raises
-    ------
-    InputError
-        If it holds something that no file can hold, like a function.
+    Refused if it holds something that no file can hold, like a function.
     """
     layout = next(each for each in LAYOUTS.values() if isinstance(value, each.kinds))
     label(group, layout.schema)
@@ -138,10 +135,7 @@ def load_record(
 ) -> Any:
     """Read the result that a file holds.
 
-    Raises
-    ------
-    InputError
-        If the file is missing or damaged, or holds something that this release cannot read.
+    Refused if the file is missing or damaged, or holds something that this release cannot read.
     """
     with open_file(path, FORMAT, VERSION) as file:
         return read_record(file[RECORD], Owner(structure, descriptors or {}))

@@ -50,10 +50,7 @@ def read_states(group: h5py.Group, owner: Owner) -> States:
 def write_value(group: h5py.Group, value: Any) -> None:
     """Write a record, or a collection of records, into an empty group.
 
-    Raises
-    ------
-    InputError
-        If it holds something that no file can hold, like a function.
+    Refused if it holds something that no file can hold, like a function.
     """
     put_json(group, ABOUT, _encode(group, value, ""))
     schema = schema_of(value)

@@ -139,11 +139,8 @@ def places_of_joints(
 ) -> tuple[tuple[str, ...], Places]:
     """Names of joints and their places, all of one dimension among `spaces`.
 
-    Raises
-    ------
-    InputError
-        For fewer than two joints, a name that is no word or `reserved`, or a place of another
-        dimension.
+    Refused for fewer than two joints, a name that is no word or `reserved`, or a place of another
+    dimension.
     """
     if len(given) < 2:
         raise InputError(f"`joints` must be at least two; got {len(given)}.")

@@ -142,13 +142,9 @@ class Measured:
 def measured_shapes(structure: Structure, section: Any, key: str) -> Measured:
     """Shapes in the rows of a table: one row for each point, its columns s, x, y.
 
-    Further columns are parameters, constant within a state; `state` distinguishes states with
-    equal parameters; `sigma` is the standard deviation of a point.
-
-    Raises
-    ------
-    InputError
-        For columns without meaning or missing, and rows that contradict each other.
+    Further columns are parameters, constant within a state; `state` distinguishes states with equal
+    parameters; `sigma` is the standard deviation of a point. Refused for columns without meaning or
+    missing, and rows that contradict each other.
     """
     columns = section.data.columns
     varied = _check_columns(structure, section, key)

@@ -53,10 +53,7 @@ class ResultsFolder:
     def adding(self) -> Generator[Path]:
         """Give an empty staging folder; its files move here when the block succeeds.
 
-        Raises
-        ------
-        InputError
-            If the folder cannot be written, or holds a file of that name that is not ours.
+        Refused if the folder cannot be written, or holds a file of that name that is not ours.
         """
         with writable(self.path):
             staging = Path(tempfile.mkdtemp(prefix=_STAGING, dir=self.path / PRIVATE))

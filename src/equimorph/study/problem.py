@@ -189,10 +189,7 @@ def _validate(content: Mapping[str, Any], folder: Path | None) -> Study:
 def parse_toml(text: str, name: str) -> dict[str, Any]:
     """Read TOML of a named file.
 
-    Raises
-    ------
-    InputError
-        If the text is malformed: with the line and what stands there.
+    Refused if the text is malformed: with the line and what stands there.
     """
     try:
         return tomllib.loads(text)

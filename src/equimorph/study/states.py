@@ -66,10 +66,7 @@ def check_natural(ground: Ground, given: NaturalSection, key: str) -> None:
 def choose_state(ground: Ground, section: StateSection, key: str) -> State:
     """Return the stable equilibrium that a section of a study describes.
 
-    Raises
-    ------
-    InputError
-        If no state is stable there, the choice is ambiguous, or `near` meets no equilibrium.
+    Refused if no state is stable there, the choice is ambiguous, or `near` meets no equilibrium.
     """
     assert ground.eset is not None
     here = ground.eset.at(**section.at)

@@ -32,11 +32,7 @@ def write_template(path: Path, kind: str) -> None:
     """Write an example study to a new file, and its data and the schema to the same folder.
 
     A schema of another release is replaced; a file of that name that is no schema of studies stays.
-
-    Raises
-    ------
-    InputError
-        If the file exists or cannot be written, or its name does not end in ``.toml``.
+    Refused if the file exists or cannot be written, or its name does not end in ``.toml``.
     """
     if path.suffix != ".toml":
         raise InputError(f"`study file` must end in .toml; got {path.name!r}.")

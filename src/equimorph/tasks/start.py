@@ -18,10 +18,7 @@ Start = State | Location | StateEstimate
 def start_state(start: Start) -> State:
     """State from which a task begins.
 
-    Raises
-    ------
-    InputError
-        If a measured one is not known: ambiguous, or on no state of the set.
+    Refused if a measured one is not known: ambiguous, or on no state of the set.
     """
     if isinstance(start, StateEstimate) and not start.known:
         raise InputError(f"`start` must be known; got an estimate that is {start.status}: "

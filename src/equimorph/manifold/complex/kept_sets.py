@@ -55,11 +55,8 @@ class Effort:
 def question_of_set(setting: Setting, box: Box, intervals: tuple[int, ...], effort: Effort) -> str:
     """All that a set depends on.
 
-    Raises
-    ------
-    InputError
-        If the structure cannot be written down, or a constraint is on a function without known
-        content.
+    Refused if the structure cannot be written down, or a constraint is on a function without known
+    content.
     """
     within = [_words(setting.structure, each) for each in setting.constraints]
     given = {
@@ -118,12 +115,8 @@ def recall_set(
 ) -> EquilibriumSet:
     """Return the set that a journal keeps for a question; without one, compute and keep it.
 
-    What is kept of tiles while it is computed gives way to the set.
-
-    Raises
-    ------
-    InputError
-        If the journal is that of another question.
+    What is kept of tiles while it is computed gives way to the set. Refused if the journal is that
+    of another question.
     """
     journal.begin(question)
     entry = journal.recall("set")

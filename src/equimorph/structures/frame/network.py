@@ -260,11 +260,8 @@ def frame_network(
 ) -> FrameNetwork:
     """Network from what a user gives, checked.
 
-    Raises
-    ------
-    InputError
-        For joints without place or members, members between unknown or equal joints, arcs that do
-        not reach, unknown supports, or joints that are not connected to the rest.
+    Refused for joints without place or members, members between unknown or equal joints, arcs that
+    do not reach, unknown supports, or joints that are not connected to the rest.
     """
     names, places = places_of_joints(joints, system, (2,), reserved=(WEIGHT, PRESSURE))
     made = tuple(Member.read(each).measured(system) for each in members)

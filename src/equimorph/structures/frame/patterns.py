@@ -117,11 +117,8 @@ def patterns(
 ) -> Patterns:
     """Patterns of all parameters, actuators first.
 
-    Raises
-    ------
-    InputError
-        For names without meaning or used twice, unknown joints or members, or a parameter that has
-        no effect.
+    Refused for names without meaning or used twice, unknown joints or members, or a parameter that
+    has no effect.
     """
     check_parameter_names([*actuators, *loads])
     found = Patterns.none(made, len(actuators) + len(loads))

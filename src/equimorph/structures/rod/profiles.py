@@ -59,12 +59,8 @@ def load_shape(
 ) -> LoadShape:
     """Make a load shape of a name, a table [[s, Q], ...] or a callable Q(s) with its `kinks`.
 
-    `name` and `symbol` are what the messages call it.
-
-    Raises
-    ------
-    InputError
-        For a table that does not run from 0 to 1, or values of a callable that are not finite.
+    `name` and `symbol` are what the messages call it. Refused for a table that does not run from 0
+    to 1, or values of a callable that are not finite.
     """
     if isinstance(spec, str):
         return _from_table(spec, np.array(NAMED[spec]), name, symbol)
@@ -129,10 +125,7 @@ INWARD = 1e-13
 def profile(spec: ProfileSpec, name: str, kinks: Sequence[float] = ()) -> LoadShape:
     """Profile f(s) of a number, a table [[s, f], ...] or a callable with its `kinks`.
 
-    Raises
-    ------
-    InputError
-        As for `load_shape`.
+    Refused as for `load_shape`.
     """
     if not isinstance(spec, int | float | np.integer | np.floating):
         return load_shape(spec, kinks, name, "f")

@@ -156,13 +156,9 @@ def rod_units(
 ) -> Units:
     """Units of a rod from its bending stiffness, length and mass, which may be texts with units.
 
-    `weight` is that of its section, if it has one of known density.
-
-    Raises
-    ------
-    InputError
-        If one of them is missing or not positive, units or a mass are named without them, or a mass
-        beside a section that gives it.
+    `weight` is that of its section, if it has one of known density. Refused if one of them is
+    missing or not positive, units or a mass are named without them, or a mass beside a section that
+    gives it.
     """
     if EI is None and length is None and not system.plain:
         raise InputError(

@@ -224,10 +224,7 @@ NO_SUPPORT = SpatialSupport(np.zeros((0, 3)), np.zeros(0), FREE, {})
 def spatial_support(joint: str, given: SpatialSupportSpec, system: UnitSystem) -> SpatialSupport:
     """Support from "fixed", "pinned", axes to hold ("x", "yz"), or a table.
 
-    Raises
-    ------
-    InputError
-        For words without meaning, or a table that holds nothing or says things twice.
+    Refused for words without meaning, or a table that holds nothing or says things twice.
     """
     table: Mapping[str, Any] = given if isinstance(given, Mapping) else _table_of_word(given)
     places = [key for key in table if key != "rotation"]

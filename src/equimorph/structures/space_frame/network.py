@@ -243,11 +243,8 @@ def spatial_network(
 ) -> SpatialNetwork:
     """Network from what a user gives, checked.
 
-    Raises
-    ------
-    InputError
-        For joints without place or members, members between unknown or equal joints, arcs that do
-        not reach, impossible hinges, unknown supports, or joints that are not connected.
+    Refused for joints without place or members, members between unknown or equal joints, arcs that
+    do not reach, impossible hinges, unknown supports, or joints that are not connected.
     """
     names, places = places_of_joints(joints, system, (3,), reserved=(WEIGHT, PRESSURE))
     made = tuple(SpatialMember.read(each).measured(system) for each in members)

@@ -100,13 +100,8 @@ def _follow(
 def pinned_guess(rod: PinnedMechanics, state: Any) -> tuple[Lanes, dict[str, float]]:
     """A state between coaxial clamps, turned as a whole to the x axis; and its clamps there.
 
-    Its unknowns, and the parameters that place the clamps.
-
-    Raises
-    ------
-    InputError
-        For anything but the state of a rod in space of the same resolution, between clamps that
-        are not on one axis.
+    Its unknowns, and the parameters that place the clamps. Refused for anything but the state of a
+    rod in space of the same resolution, between clamps that are not on one axis.
     """
     other = getattr(getattr(state, "structure", None), "mechanics", None)
     if not (isinstance(state, State) and isinstance(other, SpatialMechanics)):

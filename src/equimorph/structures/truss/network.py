@@ -207,11 +207,8 @@ def truss_network(
 ) -> TrussNetwork:
     """Network from what a user gives, checked.
 
-    Raises
-    ------
-    InputError
-        For joints without place or bars, bars between unknown, equal or held joints, unknown
-        supports, or if nothing can move.
+    Refused for joints without place or bars, bars between unknown, equal or held joints, unknown
+    supports, or if nothing can move.
     """
     names, places = places_of_joints(joints, system, (2, 3))
     made = tuple(Bar.read(each).measured(system) for each in bars)

@@ -87,12 +87,9 @@ class Unknowns:
 def unknowns(start: States, wanted: Wanted, family: Family | None = None) -> Unknowns:
     """Parameters as a linear function of the unknowns to fit.
 
-    Raises
-    ------
-    InputError
-        If there is no unknown, a name or kind is not known, a parameter occurs in two unknowns, a
-        value differs between the states, a gain multiplies zeros, data have no family or do not
-        belong to it, or the nominal member of the family is another structure.
+    Refused if there is no unknown, a name or kind is not known, a parameter occurs in two unknowns,
+    a value differs between the states, a gain multiplies zeros, data have no family or do not
+    belong to it, or the nominal member of the family is another structure.
     """
     if not wanted:
         raise InputError("`unknown` must name at least one parameter; got nothing.")

@@ -51,11 +51,8 @@ class DesignFamily:
     def of(cls, make: Callable[..., Structure], variables: Bounds) -> "DesignFamily":
         """Read bounds (low, high) or (low, high, start) of each variable.
 
-        Raises
-        ------
-        InputError
-            If there is none, `make` does not take their names, bounds are not finite with
-            low < high, or a start lies outside.
+        Refused if there is none, `make` does not take their names, bounds are not finite with low <
+        high, or a start lies outside.
         """
         if not variables:
             raise InputError("`variables` must name at least one variable; got none.")

@@ -153,10 +153,7 @@ def value_piece(kind: str, state: State, objective: Objective, bound: float = 0.
 def carry_over(value: Moved, old: Structure, new: Structure) -> Moved:
     """Descriptors and constraints of a structure, or records of them, made again for another one.
 
-    Raises
-    ------
-    InputError
-        For a descriptor of the structure that does not remember how it was made.
+    Refused for a descriptor of the structure that does not remember how it was made.
     """
     if old is new or old.signature == new.signature:
         return value

@@ -198,11 +198,8 @@ def unloaded_base(
 ) -> Float[np.ndarray, " parameters"]:
     """All parameters of the unloaded structure at the lower corner of a grid.
 
-    Raises
-    ------
-    InputError
-        If the grid does not have two parameters, the load is one of them or fixed, or a name is
-        unknown.
+    Refused if the grid does not have two parameters, the load is one of them or fixed, or a name is
+    unknown.
     """
     if len(grid.names) != 2:
         raise InputError(f"`grid` must have two parameters; got {', '.join(grid.names)}.")

@@ -273,10 +273,7 @@ Wish = Annotated[Term | Sequence[tuple[float, Term]] | Objective, ANYTHING]
 def objective_of(wish: Wish, structure: Structure) -> Objective:
     """Check the objective that a caller passes.
 
-    Raises
-    ------
-    InputError
-        For an unknown name, a weight that is not positive, or rates of unknown parameters.
+    Refused for an unknown name, a weight that is not positive, or rates of unknown parameters.
     """
     given = wish.terms if isinstance(wish, Objective) else wish
     single = isinstance(given, str | Rates | Descriptor) or not isinstance(given, Sequence)

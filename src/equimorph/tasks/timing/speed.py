@@ -202,10 +202,7 @@ class Course:
     def of(cls, schedule: Schedule, start: State | None, structure: Structure | None) -> "Course":
         """Lift the schedule, and compute frequencies at some of its states.
 
-        Raises
-        ------
-        InputError
-            If it is not safe, or comes to a fold.
+        Refused if it is not safe, or comes to a fold.
         """
         done = verify(schedule, start, structure=structure)
         if done.schedule is None:

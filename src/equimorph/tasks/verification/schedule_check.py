@@ -307,10 +307,7 @@ def _moving(rows: Float[np.ndarray, "rows parameters"]) -> Float[np.ndarray, "mo
 def first_state(schedule: Schedule, structure: Structure | None) -> State:
     """State in which a schedule begins; its structure is that of the schedule by default.
 
-    Raises
-    ------
-    InputError
-        If it carries no structure, or does not begin at an equilibrium.
+    Refused if it carries no structure, or does not begin at an equilibrium.
     """
     owner, unknowns = structure, schedule.start.get("unknowns")
     if owner is None:
