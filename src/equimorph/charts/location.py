@@ -31,7 +31,7 @@ from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.complex.kept_tables import adjacency_of, places_of
 from equimorph.manifold.geometry.points import VertexKind, are_singular, on_fold
 from equimorph.manifold.geometry.setting import embed
-from equimorph.manifold.geometry.simplices import volumes
+from equimorph.manifold.geometry.simplices import longest_sides, middles, volumes
 from equimorph.manifold.geometry.topology import (
     Adjacency,
     adjacency,
@@ -275,15 +275,9 @@ class Cells:
         return good
 
     @cached_property
-    def _frames(self) -> Float[np.ndarray, "own d coordinates"]:
-        """Sides of the cells from their first corners, in the metric."""
-        place = places_of(self.eset)
-        return np.asarray(place[self.corners[:, 1:]] - place[self.corners[:, :1]])
-
-    @cached_property
     def sizes(self) -> Float[np.ndarray, " own"]:
         """Longest sides from the first corners of the cells, in the metric."""
-        return np.asarray(np.linalg.norm(self._frames, axis=2).max(axis=1))
+        return longest_sides(places_of(self.eset), self.corners)
 
     @cached_property
     def ranges(self) -> Place:
@@ -293,7 +287,7 @@ class Cells:
     @cached_property
     def _middles(self) -> cKDTree:
         setting, points = self.coordinates.setting, self.eset.points
-        return cKDTree(embed(setting, points.z, points.p)[self.corners].mean(axis=1))
+        return cKDTree(middles(embed(setting, points.z, points.p), self.corners))
 
     def nearest(self, states: States) -> Items:
         """Places, among these, of the cells whose middles are nearest to states."""
@@ -303,7 +297,9 @@ class Cells:
     def planes(self, cell: Int[np.ndarray, " hits"]) -> Float[np.ndarray, "hits d coordinates"]:
         """Orthonormal bases of the planes of cells."""
         some, back = np.unique(cell, return_inverse=True)
-        basis = np.linalg.qr(np.swapaxes(self._frames[some], 1, 2))[0]
+        place, corners = places_of(self.eset), self.corners[some]
+        sides = place[corners[:, 1:]] - place[corners[:, :1]]
+        basis = np.linalg.qr(np.swapaxes(sides, 1, 2))[0]
         return np.ascontiguousarray(np.swapaxes(basis, 1, 2)[back])
 
     def _doubtful(self, hits: Hits, good: Bool[np.ndarray, " hits"], count: int) -> Items:

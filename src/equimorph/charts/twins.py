@@ -55,11 +55,13 @@ def _guesses(
     left, sizes, right = np.linalg.svd(slopes)
     steps = np.einsum("lk,lkf->lf", right[:, -1], frames)
     dz, dp = split_step(setting, steps)
-    values = []
-    for side in (-STEP, 0.0, STEP):
-        there = _onto_set(setting, z + side * dz, p + side * dp, rows)
-        values.append(coordinates(there.z, there.p) / ranges)
-    second = (values[0] - 2.0 * values[1] + values[2]) / STEP**2
+    # both sides at once: single states cost calls, not arithmetic
+    beside_z, beside_p = (
+        np.concatenate([each - STEP * d, each + STEP * d]) for each, d in ((z, dz), (p, dp))
+    )
+    there = _onto_set(setting, beside_z, beside_p, np.concatenate([rows, rows]))
+    below, above = np.split(coordinates(there.z, there.p) / ranges, 2)
+    second = (below - 2.0 * coordinates(z, p) / ranges + above) / STEP**2
     bend = np.einsum("lm,lm->l", left[:, :, -1], second)
     with np.errstate(divide="ignore", invalid="ignore"):
         t = -2.0 * sizes[:, -1] / bend

@@ -201,7 +201,8 @@ class _Ledger:
     def enter(self, lanes: Some, curve: Curve, outcome: Traces, number: int) -> None:
         """Take up the outcome of a leg."""
         self.z[lanes], self.p[lanes] = curve.states(outcome.z, outcome.t)
-        self._ahead[lanes] = curve.states(outcome.z, outcome.t + AHEAD)[1]
+        met = np.flatnonzero(outcome.code == EventCode.CONSTRAINT)
+        self._ahead[lanes[met]] = curve.take(met).states(outcome.z[met], outcome.t[met] + AHEAD)[1]
         self.code[lanes], self.index[lanes] = outcome.code, outcome.index
         self.at[lanes] = number + outcome.t
         self.length[lanes] += outcome.travelled

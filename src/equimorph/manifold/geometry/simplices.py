@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from equimorph.arrays import Float, ItemValues, Place, Places
+from equimorph.arrays import Cells, Float, ItemValues, Place, Places
 
 
 def volumes(corners: Float[np.ndarray, "n corners d"]) -> ItemValues:
@@ -15,6 +15,26 @@ def volumes(corners: Float[np.ndarray, "n corners d"]) -> ItemValues:
         return np.asarray(0.5 * (sides[:, 0, 0] * sides[:, 1, 1] - sides[:, 0, 1] * sides[:, 1, 0]))
     normal = np.cross(sides[:, 1], sides[:, 2])
     return np.asarray(np.einsum("ni,ni->n", sides[:, 0], normal) / 6.0)
+
+
+def middles(
+    places: Float[np.ndarray, "V embedding"], cells: Cells
+) -> Float[np.ndarray, "C embedding"]:
+    """Means of the corners of cells, corner by corner: no array of all corners is made."""
+    first, *rest = cells.T
+    total = places[first]
+    for corner in rest:
+        total = total + places[corner]
+    return np.asarray(total / cells.shape[1])
+
+
+def longest_sides(
+    places: Float[np.ndarray, "V embedding"], cells: Cells
+) -> Float[np.ndarray, " C"]:
+    """Longest side of each cell from its first corner."""
+    first, *rest = cells.T
+    sides = [np.linalg.norm(places[corner] - places[first], axis=1) for corner in rest]
+    return np.asarray(np.max(sides, axis=0))
 
 
 def barycentric(

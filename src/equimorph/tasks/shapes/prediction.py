@@ -15,6 +15,7 @@ from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet, Level, level_set
 from equimorph.manifold.complex.kept_tables import from_cache, places_of
 from equimorph.manifold.geometry.setting import Setting, embed
+from equimorph.manifold.geometry.simplices import longest_sides, middles
 from equimorph.manifold.geometry.topology import faces_of, pieces
 from equimorph.manifold.lookup.cell_index import CellIndex, Hits
 from equimorph.manifold.queries.nearest import SetPoints, local_minima, points_at_vertices
@@ -83,7 +84,7 @@ class Predictor:
     @cached_property
     def _middles(self) -> cKDTree:
         """The middles of the cells in the metric."""
-        return cKDTree(places_of(self.eset)[self.eset.cells].mean(axis=1))
+        return cKDTree(middles(places_of(self.eset), self.eset.cells))
 
     def holds(self, states: States) -> Flags:
         """Whether states lie on the cells: next to one with their index.
@@ -119,9 +120,7 @@ class Predictor:
     @cached_property
     def _sizes(self) -> Float[np.ndarray, " C"]:
         """Longest side of each cell from its first corner."""
-        places, (first, *rest) = places_of(self.eset), self.eset.cells.T
-        sides = [np.linalg.norm(places[c] - places[first], axis=1) for c in rest]
-        return np.asarray(np.max(sides, axis=0))
+        return longest_sides(places_of(self.eset), self.eset.cells)
 
     @cached_property
     def _sides(self) -> Int[np.ndarray, " C"]:
