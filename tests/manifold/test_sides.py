@@ -5,6 +5,7 @@ import pytest
 
 from equimorph.manifold import VertexKind, equilibrium_set
 from equimorph.model import Box
+from equimorph.structures import Rod, Spring
 from oracles.polynomial import Polynomial
 from oracles.surfaces import integral
 from typecheck import unchecked
@@ -140,3 +141,39 @@ def test_diagrams_begin_at_folds_and_crossings():
             counts = np.bincount(eset.over(a=np.linspace(0.01, 0.99, 50)).point)
         assert eset.audit.clean, eset.audit.faults
         assert (counts == sheets).all()
+
+
+@pytest.mark.parametrize("intervals", [(12, 12), (13, 17)])
+def test_the_spring_is_clean_from_no_load_on(intervals):
+    """Its pitchfork at x_l = 1 is a cusp over (x_l, F), in corners of boxes over F >= 0.
+
+    Closed form: for F = 0 and x_l < 1 there are three states, one of which is flat; the fold at
+    k (1 − x_l^⅔)^(3/2) leaves one of them.
+    """
+    spring = Spring()
+    with unchecked():
+        eset = equilibrium_set(spring, Box(x_l=(0.5, 1), F=(0, 0.2)), intervals=intervals)
+        beside = equilibrium_set(spring, Box(x_l=(1, 1.5), F=(0, 0.2)), intervals=intervals)
+        x, F = np.random.default_rng(0).uniform((0.5, 0.0), (1.0, 0.2), (200, 2)).T
+        counts = np.bincount(eset.over(x_l=x, F=F).point, minlength=200)
+    assert eset.audit.clean
+    assert beside.audit.clean
+    np.testing.assert_array_equal(counts, np.where((1.0 - x ** (2 / 3)) ** 1.5 > F, 3, 1))
+    assert set(beside.cell_index) == {0}
+
+
+def test_half_of_a_symmetric_set_is_half_of_it():
+    """Over Δ >= 0, the arch has the pieces that the half of the set over all Δ has."""
+    arch = Rod(load="uniform")
+    common = {"fixed": {"q": 2.5}, "within": [arch.max_curvature <= 20]}
+    half = equilibrium_set(arch, Box(Theta=(0.2, 2.5), Delta=(0, 2)), intervals=(12, 12), **common)
+    with unchecked():
+        box = Box(Theta=(0.2, 2.5), Delta=(-2, 2))
+        whole = equilibrium_set(arch, box, intervals=(12, 21), **common)
+        places = np.random.default_rng(0).uniform((0.2, 0.0), (2.5, 2.0), (150, 2))
+        counts = [
+            np.bincount(each.over(Theta=places[:, 0], Delta=places[:, 1]).point, minlength=150)
+            for each in (half, whole)
+        ]
+    assert half.audit.clean
+    np.testing.assert_array_equal(*counts)

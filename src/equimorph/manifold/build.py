@@ -197,16 +197,18 @@ def _of_grid(order: _Order, intervals: tuple[int, ...]) -> EquilibriumSet:
     lines, box = grid_lines(order.box, intervals), order.box
     lifting = _start_lifting(order, lines)
     cells, eset = lifting.upright()
-    if is_stuck_at_sides(lifting.pairing, cells):
-        wide = widened(lines, order.setting.limits)
-        beyond = replace(
-            order, box=box_of(box.names, wide), effort=replace(order.effort, tiles=None)
-        )
-        again = _start_lifting(beyond, wide)
-        found = trimmed(_complete(again, *again.upright()), box)
-        if sum(found.audit.faults.values()) < sum(eset.audit.faults.values()):
-            return found
-    return _complete(lifting, cells, eset)
+    early = is_stuck_at_sides(lifting.pairing, cells)
+    if not early:
+        cells, eset = _complete(lifting, cells, eset)
+        if not is_stuck_at_sides(lifting.pairing, cells):
+            return eset
+    wide = widened(lines, order.setting.limits)
+    effort = replace(order.effort, tiles=None)
+    again = _start_lifting(replace(order, box=box_of(box.names, wide), effort=effort), wide)
+    found = trimmed(_complete(again, *again.upright())[1], box)
+    if sum(found.audit.faults.values()) < sum(eset.audit.faults.values()):
+        return found
+    return _complete(lifting, cells, eset)[1] if early else eset
 
 
 def _start_lifting(order: _Order, lines: Lines) -> "_Lifting":
@@ -217,8 +219,10 @@ def _start_lifting(order: _Order, lines: Lines) -> "_Lifting":
     return _Lifting(pairing, order, tuple(len(line) - 1 for line in lines), order.rounds(lines))
 
 
-def _complete(lifting: "_Lifting", cells: Cells, eset: EquilibriumSet) -> EquilibriumSet:
-    """A set, and what the completeness checks find that it lacks."""
+def _complete(
+    lifting: "_Lifting", cells: Cells, eset: EquilibriumSet
+) -> tuple[Cells, EquilibriumSet]:
+    """Cells and set, with what the completeness checks find that it lacks."""
     pairing, order, effort = lifting.pairing, lifting.order, lifting.order.effort
     generator = np.random.default_rng([effort.seed, 1])
     recovered = 0
@@ -233,7 +237,7 @@ def _complete(lifting: "_Lifting", cells: Cells, eset: EquilibriumSet) -> Equili
         some = np.unique(np.linspace(0, lacking - 1, RECOVERED).astype(int))
         recover(pairing, found.missing[some])
         cells, eset = lifting.upright()
-    return lifting.with_checks(cells, eset, found, recovered)
+    return cells, lifting.with_checks(cells, eset, found, recovered)
 
 
 class _Lifting:

@@ -24,14 +24,16 @@ from equimorph.arrays import (
     VertexFlags,
     VertexNumbers,
 )
+from equimorph.equilibria.locus import Locus, nearest
 from equimorph.manifold.complex.description import Complex, describe_again
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.manifold.complex.excerpts import excerpt_of, sheets_of
+from equimorph.manifold.complex.kept_tables import places_of
 from equimorph.manifold.complex.vertices import Vertices
 from equimorph.manifold.geometry.exact_points import Aim, Pinned, correct_points
 from equimorph.manifold.geometry.points import VertexKind, are_singular
 from equimorph.manifold.geometry.setting import embed
-from equimorph.manifold.geometry.topology import adjacency
+from equimorph.manifold.geometry.topology import adjacency, flags_of
 from equimorph.manifold.lifting.cells import Cells
 from equimorph.manifold.lifting.grid import Lines
 from equimorph.manifold.lifting.pairing import Pairing, abandoned_rays
@@ -47,6 +49,8 @@ SHARES = np.array([1.0, 0.6180, 0.7549])
 """Of the free parameters: diagonals through corners must not pass through the moved ones."""
 ON_SIDE = 1e-9
 """Distance from a side, in widths of the box, of vertices that lie on it."""
+NEARER = 0.5
+"""How far vertices may go to cusps, over the distance of the nearest one in the box."""
 
 
 def is_stuck_at_sides(pairing: Pairing, cells: Cells) -> bool:
@@ -146,11 +150,19 @@ class _Trim:
         points = States(eset.structure, z, p)
         whole = replace(_only(eset, np.ones(len(eset.cells), bool)), points=points, fresh=None)
         pairs = np.concatenate([self._coinciding(points), self._swallowed(points, found)])
-        same = pairs[:0]
+        same, flaws = pairs[:0], self._flaws(whole)
         for own in _groups(pairs, len(points)):
             more = np.concatenate([same, own])
-            same = same if _folds_over(whole, more) else more
+            same = more if (self._flaws(_welded(whole, more)) <= flaws).all() else same
         return describe_again(eset, _welded(whole, same), eset.setting)
+
+    def _flaws(self, whole: Complex) -> Int[np.ndarray, " 2"]:
+        """Facets with more than two cells, and those with one that do not lie on a side."""
+        known, box = adjacency(whole.cells), self.box
+        place, slack = whole.points.p[:, self.eset.setting.free], ON_SIDE * (box.upper - box.lower)
+        on = [np.abs(place - bound) <= slack for bound in (box.lower, box.upper)]
+        inside = ~np.concatenate(on, axis=1)[known.facets].all(axis=1).any(axis=1)
+        return np.array([(known.counts > 2).sum(), (inside & (known.counts == 1)).sum()])
 
     @cached_property
     def _beyond(self) -> VertexFlags:
@@ -194,6 +206,9 @@ class _Trim:
             best = away.argmin(axis=0)
             for k, at in enumerate(found):
                 yield rows[best == k], at.take(np.flatnonzero(best == k))
+            if kind == VertexKind.FOLD and d > 1:
+                left = rows[np.isinf(away.min(axis=0))]
+                yield left, self._cusps(left)
 
     def _settled(self, rows: Items, kind: VertexKind, span: Float[np.ndarray, "k d"]) -> Pinned:
         """Points on a fold, constraint or crossing in the box, where some parameters may move."""
@@ -205,10 +220,24 @@ class _Trim:
         spans = np.tile(span, (len(rows), 1, 1))
         crossing = kind == VertexKind.CROSSING
         aim = Aim(eset.setting, fold, cap, spans, place, place[:, None][:, :0], crossing=crossing)
-        at = correct_points(aim, z, p, np.zeros(len(rows)))
-        free = at.p[:, eset.setting.free]
+        return self._in_box(correct_points(aim, z, p, np.zeros(len(rows))))
+
+    def _cusps(self, rows: Items) -> Pinned:
+        """Cusps in sides, as on lines of symmetry, which folds lead to from vertices beyond."""
+        eset, structure = self.eset, self.eset.structure
+        tests = (lambda at: at.g, lambda at: at.quadratic)
+        locus = Locus(structure, eset.setting.base, eset.setting.free, tests)
+        spots, found = nearest(locus, locus.join(eset.points.z[rows], self._clipped[rows]))
+        z, p = locus.split(spots.x)
+        moves = embed(eset.setting, z, p) - places_of(eset)[rows]
+        found &= np.linalg.norm(moves, axis=1) < [self._room(row) for row in rows.tolist()]
+        return self._in_box(Pinned(z, p, found))
+
+    def _in_box(self, at: Pinned) -> Pinned:
+        """Points, found only if they are in the box; there they lie on sides to the last digit."""
+        free = at.p[:, self.eset.setting.free]
         at.found[~self.box.holds(free, ON_SIDE)] = False
-        at.p[:, eset.setting.free] = np.clip(free, self.box.lower, self.box.upper)
+        at.p[:, self.eset.setting.free] = np.clip(free, self.box.lower, self.box.upper)
         return at
 
     def _coinciding(self, points: States) -> Pairs:
@@ -219,16 +248,32 @@ class _Trim:
         return np.asarray(rows[cKDTree(place).query_pairs(SAME_VERTEX, output_type="ndarray")])
 
     def _swallowed(self, points: States, found: VertexFlags) -> Pairs:
-        """Vertices that cannot go to a side because a fold or crossing lies between, and this."""
-        eset, free = self.eset, self.eset.setting.free
-        lost, met = ~found, found & are_singular(eset.kinds) & self._beyond
-        near = eset.cells[lost[eset.cells].any(axis=1) & met[eset.cells].any(axis=1)]
-        pairs = np.array(
-            [(a, b) for cell in near.tolist() for a in cell if lost[a] for b in cell if met[b]], int
-        ).reshape(-1, 2)
-        gap = np.abs(self._clipped[pairs[:, 0]] - points.p[pairs[:, 1]])[:, free]
+        """Vertices that cannot go to a side because it is singular there, and what is nearby.
+
+        That is a point of a fold or crossing that lies between, or at the place itself.
+        """
+        eset = self.eset
+        lost = np.flatnonzero(~found)
+        met = np.flatnonzero(found & are_singular(eset.kinds) & self._beyond)
+        there = self._clipped[lost][:, None] - points.p[met][None]
         moved = np.maximum(self.box.lower - eset.box.lower, eset.box.upper - self.box.upper)
-        return np.asarray(pairs[(gap <= 2.0 * moved).all(axis=1)])
+        near = (np.abs(there[:, :, eset.setting.free]) <= 2.0 * moved).all(axis=2)
+        place = embed(eset.setting, points.z, points.p)
+        pairs = [
+            (row, other)
+            for row, own in zip(lost.tolist(), near, strict=True)
+            for other in met[own].tolist()
+            if np.linalg.norm(place[row] - place[other]) < self._room(row)
+        ]
+        return np.array(pairs, int).reshape(-1, 2)
+
+    def _room(self, row: int) -> float:
+        """How far a vertex may go: a share of the distance from the nearest one in the box."""
+        around = np.unique(self.eset.cells[(self.eset.cells == row).any(axis=1)])
+        around = around[~self._beyond[around]]
+        places = places_of(self.eset)
+        gaps = np.linalg.norm(places[around] - places[row], axis=1)
+        return NEARER * float(gaps.min(initial=np.inf))
 
 
 def _groups(pairs: Pairs, count: int) -> list[Int[np.ndarray, "_ 2"]]:
@@ -249,31 +294,43 @@ def _one_of_same(whole: Complex, same: Pairs) -> VertexNumbers:
     return np.asarray(order[first][label])
 
 
-def _folds_over(whole: Complex, same: Pairs) -> bool:
-    """Whether more facets have more than two cells if vertices are one."""
-    cells = _one_of_same(whole, same)[whole.cells]
-    crowded = [(adjacency(own).counts > 2).sum() for own in (whole.cells, cells[_distinct(cells)])]
-    return bool(crowded[1] > crowded[0])
-
-
 def _welded(whole: Complex, same: Pairs) -> Complex:
-    """Cells in which vertices that are the same point are one."""
+    """Cells in which vertices that are the same point are one.
+
+    Two cells with the same vertices then lie on one another and vanish; what they leave between
+    cells of different index is a fold.
+    """
     if len(same) == 0:
         return whole
-    count, one = len(whole.points), _one_of_same(whole, same)
-    kept = _distinct(one[whole.cells])
-    used, cells = np.unique(one[whole.cells[kept]], return_inverse=True)
-    number = np.full(count, -1)
+    one = _one_of_same(whole, same)
+    cells, index = one[whole.cells], whole.cell_index
+    kept = _distinct(cells)
+    _, label, counts = np.unique(
+        np.sort(cells, axis=1), axis=0, return_inverse=True, return_counts=True
+    )
+    double = kept & (counts == 2)[label]
+    gone, cells, index = cells[double], cells[kept & ~double], index[kept & ~double]
+    known = adjacency(cells)
+    between = known.across[index[known.links[:, 0]] != index[known.links[:, 1]]]
+    left = known.facets[between]
+    left = left[flags_of(left, _facets(gone))]
+    used, numbered = np.unique(cells, return_inverse=True)
+    number = np.full(len(one), -1)
     number[used] = np.arange(len(used))
-    marked = {}
-    for name in ("folds", "caps", "crossings"):
-        facets = number[one[getattr(whole, name)]]
-        marked[name] = facets[(facets >= 0).all(axis=1) & _distinct(facets)]
+    marked = {name: one[getattr(whole, name)] for name in ("folds", "caps", "crossings")}
+    marked["folds"] = np.concatenate([marked["folds"], left])
+    marked = {name: number[facets[_distinct(facets)]] for name, facets in marked.items()}
+    marked = {name: facets[(facets >= 0).all(axis=1)] for name, facets in marked.items()}
     columns = {name: getattr(whole, name)[used] for name in ("kinds", "index", "grid_vertex")}
     return replace(
-        whole, points=whole.points[used], **columns, cells=cells.reshape(-1, whole.cells.shape[1]),
-        cell_index=whole.cell_index[kept], **marked,
+        whole, points=whole.points[used], **columns, cells=numbered.reshape(cells.shape),
+        cell_index=index, **marked,
     )  # fmt: skip
+
+
+def _facets(cells: Facets) -> Facets:
+    """All facets of some cells."""
+    return np.concatenate([np.delete(cells, k, axis=1) for k in range(cells.shape[1])])
 
 
 def _distinct(rows: Facets) -> ItemFlags:

@@ -226,7 +226,7 @@ def _breadths(
     out = np.empty((len(cells), corners))
     for k in range(corners):
         rest = np.delete(np.arange(corners), k)
-        own = np.maximum(length[:, k, rest], 1e-300)
+        own = np.maximum(length[:, k, rest], 1e-150)
         inner = length[:, rest[:, None], rest]
         cosines = 0.5 * (own[:, :, None] + own[:, None, :] - inner)
         cosines /= np.sqrt(own[:, :, None] * own[:, None, :])
