@@ -151,6 +151,22 @@ def test_fold_of_the_symmetric_sheet_passes_its_pitchforks(k, grid):
     np.testing.assert_allclose(eset.coordinates[hub], [[0.0, 0.0]], atol=1e-3)
 
 
+@pytest.mark.parametrize("grid", [(3, 3), (4, 5)])
+@pytest.mark.parametrize(("k", "bend"), [(0.4, 1.5), (2.5, 0.5), (2.5, 1.5)])
+def test_hilltops_are_found_on_crossings_that_bend(k, bend, grid):
+    """s² + k x² (1 + 3 bend s²) = a, x (s + bend s³ − b) = 0: the hilltop at 0 needs no bisection.
+
+    With guesses on the chord of the crossing Newton's method did not come near it: 3 to 10
+    triangles were bisected here, and two sets of frames of the soak had no end of it.
+    """
+    eset = lifted(hilltop(k, bend), BOX, intervals=grid)
+    assert_faithful(eset)
+    assert_crossings(eset)
+    assert eset.audit.bisected == 0
+    hub = np.intersect1d(eset.folds[0], eset.crossings[0])
+    np.testing.assert_allclose(eset.coordinates[hub], [[0.0, 0.0]], atol=1e-3)
+
+
 @pytest.mark.slow
 @few(4)
 @given(intervals)

@@ -77,12 +77,14 @@ def tricritical(cubic: float) -> Polynomial:
     return Polynomial(lambda x, a, b: integral(x**5 + cubic * b * x**3 - a * x), 1, ("a", "b"))
 
 
-def hilltop(k: float) -> Polynomial:
-    """s² + k x² = a, x (s − b) = 0: the fold of the sheet x = 0 passes its pitchforks at b = 0.
+def hilltop(k: float, bend: float = 0.0) -> Polynomial:
+    """s² + k x² (1 + 3 bend s²) = a, x (s + bend s³ − b) = 0: the fold of the sheet x = 0.
 
-    The pitchforks are s = b, a = b². The other sheet, s = b, has no fold.
+    It passes its pitchforks, b = s + bend s³, a = s², at b = 0. The other sheet has no fold.
     """
-    return Polynomial(lambda s, x, a, b: s**3 * (1 / 3) + k * x**2 * (s - b) - a * s, 2, ("a", "b"))
+    return Polynomial(
+        lambda s, x, a, b: s**3 * (1 / 3) + k * x**2 * (s + bend * s**3 - b) - a * s, 2, ("a", "b")
+    )
 
 
 def three_planes() -> Polynomial:

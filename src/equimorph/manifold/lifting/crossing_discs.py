@@ -172,16 +172,16 @@ def _hub(pairing: Pairing, triangle: int, chord: Chord) -> int | None:
     other = int(np.ptp(lower_index(setting.structure, z, p)))
     skew = (np.abs(quadratic) > SKEW * np.abs(cubic)).any()
     found: list[Pinned] = []
+    known = {0.0: (z[0], p[0]), 1.0: (z[1], p[1])}
 
     def test(share: float) -> float:
         middle = (place[0] + share * way)[None]
         aim = Aim(setting, False, False, span, middle, rows, crossing=True)
-        # in this form what both have in common stays what it is, to the last digit
-        guess_z, guess_p = (each[:1] + share * (each[1:] - each[:1]) for each in (z, p))
-        pinned = correct_points(aim, guess_z, guess_p, np.array([length]))
+        pinned = correct_points(aim, *_guess(known, share), np.array([length]))
         if not pinned.found[0]:
             raise _NoCrossingError
         found.append(pinned)
+        known[share] = pinned.z[0], pinned.p[0]
         values = _coefficients(pairing, pinned.z, pinned.p, sense)
         return float(1.0 / values[1][0] if other else values[1 - skew][0])
 
@@ -192,6 +192,22 @@ def _hub(pairing: Pairing, triangle: int, chord: Chord) -> int | None:
     index = int(store.index[ends].min())
     pairing.hubs[chord] = store.add(found[-1].z[0], found[-1].p[0], index, VertexKind.CROSSING)
     return pairing.hubs[chord]
+
+
+def _guess(
+    known: dict[float, tuple[ItemValues, ItemValues]], share: float
+) -> tuple[Float[np.ndarray, "1 size"], Float[np.ndarray, "1 P"]]:
+    """State and parameters between the nearest known points on both sides.
+
+    Near a hub Newton's method converges from nearby only.
+    """
+    before = max(each for each in known if each <= share < 1.0 or each < share)
+    after = min(each for each in known if each > before)
+    part = (share - before) / (after - before)
+    # in this form what both have in common stays what it is, to the last digit
+    one, other = known[before], known[after]
+    z, p = ((a + part * (b - a))[None] for a, b in zip(one, other, strict=True))
+    return z, p
 
 
 def _halve(test: Callable[[float], float]) -> None:
