@@ -1,4 +1,4 @@
-"""Time against lanes, grid, elements and degree: writes docs/growth.png and docs/performance.md.
+"""Time against lanes, grid, elements and degree: writes docs/growth.png and docs/growth.md.
 
 Run it on an idle machine: ``python benchmarks/growth.py``. Times are the least of several runs, all
 kernels compiled before.
@@ -218,9 +218,9 @@ def table(
     steps: Sequence[Sequence[Timing]],
     totals: Sequence[Timing],
 ) -> str:
-    """Text of docs/performance.md."""
+    """Text of docs/growth.md."""
     lines = [
-        "# Performance", "",
+        "# Growth with lanes, grids and elements", "",
         f"{machine()}; warm; least of several runs;",
         "the default rod (6 elements of degree 9) unless said. Written by",
         "`benchmarks/growth.py`; `make bench-all` runs the benchmarks.",
@@ -265,7 +265,7 @@ def main() -> None:
     totals = [equilibria_along_paths(), limit_loads(10_000), natural(10_000)]
     totals += [curvatures(GRIDS[-1], load) for load in LOADS]
     figure(rows, grids, steps)
-    (DOCS / "performance.md").write_text(table(rows, grids, steps, totals), encoding="utf-8")
+    (DOCS / "growth.md").write_text(table(rows, grids, steps, totals), encoding="utf-8")
 
 
 if __name__ == "__main__":
