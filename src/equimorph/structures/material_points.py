@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -46,6 +47,20 @@ class SupportSprings:
         return count == 0 or (self.gaps.size > 0 and np.linalg.matrix_rank(self.gaps) == count)
 
 
+class _Moved(NamedTuple):
+    """Derivatives of all places by the coordinates, and their masses.
+
+    Multipliers follow the coordinates where constraints give way: their rates, derivatives of the
+    places by them, and the inverse of the corner of F_z there.
+    """
+
+    columns: Float[np.ndarray, "places coordinates"]
+    weights: Float[np.ndarray, " places"]
+    follow: Float[np.ndarray, "constraints coordinates"]
+    forced: Float[np.ndarray, "places constraints"]
+    compliance: Float[np.ndarray, "constraints constraints"]
+
+
 @dataclass(frozen=True)
 class MaterialPoints:
     """Masses at places, which are functions of unknowns and multipliers.
@@ -65,8 +80,8 @@ class MaterialPoints:
         count = self.equations.unknowns + (0 if springs is None else len(springs.stiffness))
         out = np.empty((len(z), count, count))
         for lane in range(len(z)):
-            flat, weights, _ = self._moved(z[lane], p[lane], springs)
-            out[lane] = flat.T @ (weights[:, None] * flat)
+            moved = self._moved(z[lane], p[lane], springs)
+            out[lane] = moved.columns.T @ (moved.weights[:, None] * moved.columns)
         return out
 
     def inertial_force(self, z: Lanes, p: Parameters, velocity: Velocity) -> Velocity:
@@ -76,12 +91,15 @@ class MaterialPoints:
             size = float(np.abs(rate).max())
             if size == 0.0:
                 continue
-            flat, weights, follow = self._moved(z[lane], p[lane])
-            way = STEP * np.concatenate([rate, follow @ rate]) / size
+            moved = self._moved(z[lane], p[lane])
+            way = STEP * np.concatenate([rate, moved.follow @ rate]) / size
             at = z[lane] + np.array([-2.0, -1.0, 0.0, 1.0, 2.0])[:, None] * way
-            x = self.places(at, np.repeat(p[lane][None], 5, axis=0)).reshape(5, -1)
-            bend = np.array([-1.0, 16.0, -30.0, 16.0, -1.0]) @ x / (12.0 * (STEP / size) ** 2)
-            out[lane] = flat.T @ (weights * bend)
+            many = np.repeat(p[lane][None], 5, axis=0)
+            twice = np.array([-1.0, 16.0, -30.0, 16.0, -1.0]) / (12.0 * (STEP / size) ** 2)
+            bend = twice @ self.places(at, many).reshape(5, -1)
+            gaps = twice @ self.equations.residual(at, many)[:, self.equations.unknowns :]
+            bend -= moved.forced @ (moved.compliance @ gaps)
+            out[lane] = moved.columns.T @ (moved.weights * bend)
         return out
 
     def _moved(
@@ -89,8 +107,8 @@ class MaterialPoints:
         z: Float[np.ndarray, " size"],
         p: Float[np.ndarray, " parameters"],
         springs: SupportSprings | None = None,
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Derivatives of all coordinates by the unknowns, their masses, rates of multipliers."""
+    ) -> _Moved:
+        """Derivatives of all places at one state."""
         n, c = self.equations.unknowns, self.equations.constraints
         places = _derivative(self.places, z, p)
         weights, places = np.repeat(self.masses, places.shape[1]), places.reshape(-1, n + c)
@@ -104,8 +122,9 @@ class MaterialPoints:
             moved, forced = np.concatenate([moved, own], axis=1), forced + own @ pulled
             gradients = np.concatenate([gradients, springs.gaps], axis=1)
             corner = corner + springs.gaps @ pulled
-        follow = -_inverse(corner, RANK * size) @ gradients
-        return moved + forced @ follow, weights, follow
+        compliance = _inverse(corner, RANK * size)
+        follow = -compliance @ gradients
+        return _Moved(moved + forced @ follow, weights, follow, forced, compliance)
 
 
 def _inverse(matrix: Float[np.ndarray, "c c"], least: float) -> Float[np.ndarray, "c c"]:

@@ -195,7 +195,7 @@ def _hub(pairing: Pairing, triangle: int, chord: Chord) -> int | None:
 
 
 def _guess(
-    known: dict[float, tuple[ItemValues, ItemValues]], share: float
+    known: dict[float, tuple[np.ndarray, np.ndarray]], share: float
 ) -> tuple[Float[np.ndarray, "1 size"], Float[np.ndarray, "1 P"]]:
     """State and parameters between the nearest known points on both sides.
 

@@ -13,7 +13,6 @@ from equimorph.arrays import (
     Scalars,
     Sides,
     Values,
-    Velocity,
 )
 from equimorph.linalg import BorderedSolution, CondensedLayout, no_border
 from equimorph.linalg.lanes import over_lanes
@@ -23,26 +22,18 @@ from equimorph.structures.equations import (
     Advance,
     AnyBorder,
     Direction,
-    JointEquations,
     Shift,
     Solver,
 )
-from equimorph.structures.material_points import MaterialPoints, SprungPoints
 from equimorph.structures.rod.general_fields import GeneralFields
+from equimorph.structures.rod.general_inertia import GeneralInertia
 from equimorph.structures.rod.general_kernels import linearise_lanes, second_lanes
 from equimorph.structures.rod.general_step_kernels import advance_lanes
-from equimorph.structures.rod.inertia import (
-    following,
-    moved_places,
-    nodal_places,
-    place_derivatives,
-)
-from equimorph.structures.rod.mechanics import LARGEST_TAIL, PlanarMechanics
+from equimorph.structures.rod.mechanics import LARGEST_TAIL
 from equimorph.structures.rod.model import RodModel, pack_tables
 from equimorph.structures.rod.planar_energy import PlanarEnergy
 from equimorph.structures.rod.pressure import EnclosedArea, lower_triangle
 from equimorph.structures.rod.reflections import symmetries
-from equimorph.tolerances import METRIC_DIFFERENCE
 
 Points = Float[np.ndarray, "lanes points"]
 
@@ -54,7 +45,7 @@ FORCES = 8.0
 """Standard deviation of random multipliers: the compressed shapes with max |κ| near 20."""
 
 
-class GeneralMechanics(JointEquations, PlanarMechanics):
+class GeneralMechanics(GeneralInertia):
     """A rod whose Lagrangian is a `RodModel`."""
 
     def __init__(self, model: RodModel) -> None:
@@ -217,46 +208,6 @@ class GeneralMechanics(JointEquations, PlanarMechanics):
         theta, y = self.nodal_angles(z, p), self.scalars(z, p)
         out = self._gradient(theta, y) + self._end_moments(theta, y) @ self.model.turned
         return np.ascontiguousarray(out[:, self.constraints : -1])
-
-    @property
-    def sprung(self) -> SprungPoints | None:
-        """Its nodes on springs at both ends, or at one where the other end is free."""
-
-        def places(z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes nodes 2"]:
-            return nodal_places(self.model, self.nodal_angles(z, p), self.scalars(z, p))
-
-        springs = self.model.springs_along
-        points = MaterialPoints(self, places, self.mesh.weights)
-        return None if springs.follow else SprungPoints(points, springs)
-
-    def inertia(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes unknowns unknowns"]:
-        """JᵀWJ of the unknown angles."""
-        moved = self._moved_places(z, p, self._following(z, p))
-        return np.asarray(moved.transpose(0, 2, 1) @ (self._place_weights[:, None] * moved))
-
-    def inertial_force(self, z: Lanes, p: Parameters, velocity: Velocity) -> Velocity:
-        """JᵀW D²x[u̇, u̇] of the unknown angles, by central differences of J."""
-        follow = self._following(z, p)
-        along = np.concatenate([velocity, np.einsum("lcu,lu->lc", follow, velocity)], axis=1)
-        step = METRIC_DIFFERENCE * along
-        ahead, behind = (self._moved_places(z + way, p, follow) for way in (step, -step))
-        bend = np.einsum("lpu,lu->lp", ahead - behind, velocity) / (2.0 * METRIC_DIFFERENCE)
-        moved = self._moved_places(z, p, follow)
-        return np.asarray(np.einsum("lpu,lp->lu", moved, self._place_weights * bend))
-
-    @property
-    def _place_weights(self) -> Float[np.ndarray, " places"]:
-        return np.repeat(self.mesh.weights, 2)
-
-    def _following(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes m unknowns"]:
-        _, gradients, trailing = self.parts(z, p)
-        return following(gradients[:, :, self.unknown_nodes], trailing)
-
-    def _moved_places(
-        self, z: Lanes, p: Parameters, follow: Float[np.ndarray, "lanes m unknowns"]
-    ) -> Float[np.ndarray, "lanes places unknowns"]:
-        columns = place_derivatives(self.model, self.nodal_angles(z, p), self.scalars(z, p))
-        return moved_places(*columns, follow, self.unknown_nodes)
 
     def linearised(self, z: Lanes, p: Parameters, dp: Parameters) -> tuple[np.ndarray, ...]:
         """F, F_p·dp, and the parts of F_z: diagonal, border, trailing block."""
