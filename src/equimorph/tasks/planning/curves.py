@@ -234,13 +234,16 @@ class CurveSteps:
         Those with less than half of a given distance from a wall are moved there.
         """
         setting, below = self.setting, replace(nodes, floor=nodes.floor - BELOW)
+        far = ~np.isfinite(distance)  # as from a barrier where there is nothing to cross
+        distance, scale = np.where(far, 0.0, distance), np.where(far, 1.0, distance)
         there, found = project_onto_set(setting, nodes.z, nodes.p, nodes.rows)
         for _ in range(PUSHES):
             below, _ = self.placed(below, there)
             lack = distance - below.walls
             lack[:, 0] += BELOW
-            worst = (lack / distance).argmax(axis=1)
-            some = np.flatnonzero((lack > NEARER * distance).any(axis=1) & found)
+            worst = (lack / scale).argmax(axis=1)
+            near = (lack > NEARER * distance).any(axis=1) & np.isfinite(lack.max(axis=1))
+            some = np.flatnonzero(near & found)
             if len(some) == 0:
                 break
             frames, at = tangents_at(setting, there.take(some))
@@ -307,7 +310,8 @@ class CurveSteps:
     def _slopes(self, nodes: Curves, frames: Frames) -> Float[np.ndarray, "nodes walls d"]:
         """Slopes of the walls along the tangents.
 
-        Those of a margin with mode w are ``wᵀ D²F[w, t]``, of constraints differences.
+        Those of a margin with mode w are ``wᵀ D²F[w, t]``, of constraints differences; walls that
+        are infinite have none.
         """
         structure, d = self.eset.structure, frames.shape[1]
         count, constraints = len(nodes.z), self.demands.constraints
@@ -321,7 +325,10 @@ class CurveSteps:
             bent = structure.second_derivative(nodes.z, nodes.p, (mode, still), (dz, dp))
             out[:, 0, k] = np.einsum("ki,ki->k", bent, mode)
             for number, each in enumerate(constraints, 1):
-                out[:, number, k] = -(each.excess(z, p) + nodes.walls[:, number]) / NUDGE
+                moved, wall = -each.excess(z, p), nodes.walls[:, number]
+                # a barrier is infinite where there is nothing to cross
+                finite = np.isfinite(moved) & np.isfinite(wall)
+                out[finite, number, k] = (moved[finite] - wall[finite]) / NUDGE
         steps = np.swapaxes(frames[:, :, structure.size :], 1, 2)
         first = 1 + len(constraints)
         out[:, first:] = np.concatenate([steps, -steps], axis=1)
