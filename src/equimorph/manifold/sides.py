@@ -9,8 +9,6 @@ from functools import cached_property
 from itertools import combinations
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from equimorph.arrays import (
@@ -25,6 +23,7 @@ from equimorph.arrays import (
     VertexNumbers,
 )
 from equimorph.equilibria.locus import Locus, nearest
+from equimorph.linalg.graphs import components
 from equimorph.manifold.complex.description import Complex, describe_again
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.manifold.complex.excerpts import excerpt_of, sheets_of
@@ -278,17 +277,14 @@ class _Trim:
 
 def _groups(pairs: Pairs, count: int) -> list[Int[np.ndarray, "_ 2"]]:
     """Pairs of vertices that hang together."""
-    graph = coo_array((np.ones(len(pairs)), pairs.T), shape=(count, count))
-    _, label = connected_components(graph, directed=False)
+    label = components(count, pairs)
     own = label[pairs[:, 0]]
     return [pairs[own == each] for each in np.unique(own)]
 
 
 def _one_of_same(whole: Complex, same: Pairs) -> VertexNumbers:
     """For each vertex the one that stands for it, a singular one if there is any."""
-    count = len(whole.points)
-    graph = coo_array((np.ones(len(same)), same.T), shape=(count, count))
-    _, label = connected_components(graph, directed=False)
+    label = components(len(whole.points), same)
     order = np.argsort(~are_singular(whole.kinds), kind="stable")
     _, first = np.unique(label[order], return_index=True)
     return np.asarray(order[first][label])

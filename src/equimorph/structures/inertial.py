@@ -9,7 +9,7 @@ import numpy as np
 from equimorph.arrays import Float, Lanes, Parameters, Velocity
 from equimorph.errors import MissingError
 from equimorph.structures.equations import Equations
-from equimorph.structures.material_points import SprungPoints
+from equimorph.structures.material_points import MaterialPoints
 
 Velocities = Float[np.ndarray, "lanes k unknowns"]
 Product = Callable[[Velocities], Velocities]
@@ -45,7 +45,7 @@ class Inertial(Equations, ABC):
         )
 
     @property
-    def sprung(self) -> SprungPoints | None:
+    def sprung(self) -> MaterialPoints | None:
         """Material points on springs whose places the unknowns leave free; None: there are none."""
         return None
 

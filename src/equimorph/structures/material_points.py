@@ -66,21 +66,24 @@ class MaterialPoints:
     """Masses at places, which are functions of unknowns and multipliers.
 
     Derivatives are differenced to fourth order. Where constraints ``c(u, λ) = 0`` give way, the
-    multipliers follow from the unknowns: ``c_u δu + c_λ δλ = 0``.
+    multipliers follow from the unknowns: ``c_u δu + c_λ δλ = 0``. Springs are given where their
+    places are coordinates, too, after the unknowns.
     """
 
     equations: Equations
     places: Places
     masses: Float[np.ndarray, " points"]
+    springs: SupportSprings | None = None
 
     def inertia(
-        self, z: Lanes, p: Parameters, springs: SupportSprings | None = None
+        self, z: Lanes, p: Parameters
     ) -> Float[np.ndarray, "lanes coordinates coordinates"]:
-        """Mass matrix JᵀWJ of the unknowns, and of the springs' places after them."""
-        count = self.equations.unknowns + (0 if springs is None else len(springs.stiffness))
+        """Mass matrix JᵀWJ of the coordinates."""
+        count = self.equations.unknowns
+        count += 0 if self.springs is None else len(self.springs.stiffness)
         out = np.empty((len(z), count, count))
         for lane in range(len(z)):
-            moved = self._moved(z[lane], p[lane], springs)
+            moved = self._moved(z[lane], p[lane])
             out[lane] = moved.columns.T @ (moved.weights[:, None] * moved.columns)
         return out
 
@@ -106,9 +109,9 @@ class MaterialPoints:
         self,
         z: Float[np.ndarray, " size"],
         p: Float[np.ndarray, " parameters"],
-        springs: SupportSprings | None = None,
     ) -> _Moved:
         """Derivatives of all places at one state."""
+        springs = self.springs
         n, c = self.equations.unknowns, self.equations.constraints
         places = _derivative(self.places, z, p)
         weights, places = np.repeat(self.masses, places.shape[1]), places.reshape(-1, n + c)
@@ -146,17 +149,3 @@ def _derivative(
     ahead, behind, twice, back = values.reshape(4, len(z), *values.shape[1:])
     slope = (8.0 * (ahead - behind) - (twice - back)) / (12.0 * STEP)
     return np.asarray(np.moveaxis(slope, 0, -1))
-
-
-@dataclass(frozen=True)
-class SprungPoints:
-    """Material points on springs whose places the unknowns leave free."""
-
-    points: MaterialPoints
-    springs: SupportSprings
-
-    def inertia(
-        self, z: Lanes, p: Parameters
-    ) -> Float[np.ndarray, "lanes coordinates coordinates"]:
-        """Mass matrix of the unknowns and the places of the springs."""
-        return self.points.inertia(z, p, self.springs)

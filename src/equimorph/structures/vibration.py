@@ -12,6 +12,7 @@ from equimorph.arrays import Float, Lanes, Parameters
 from equimorph.errors import InputError
 from equimorph.structures.contract import Structure
 from equimorph.structures.inertial import Product
+from equimorph.structures.material_points import SupportSprings
 
 GUARD = 4
 """Vectors beyond those asked for: subspace iteration converges by the ratio to the next one."""
@@ -96,17 +97,16 @@ class _Moving:
         n, size = structure.unknowns, structure.size
         solve = structure.linear_system(z, p, np.zeros((len(z), 0, p.shape[1]))).solve
         sprung = structure.sprung
-        if sprung is None:
+        if sprung is None or sprung.springs is None:
+            springs = SupportSprings.of((), structure.constraints, 1)
+            inertia = structure.inertia_product(z, p)
+        else:
+            springs, mass = sprung.springs, sprung.inertia(z, p)
 
-            def response(forces: np.ndarray) -> np.ndarray:
-                rhs = np.zeros((*forces.shape[:2], size))
-                rhs[:, :, :n] = forces
-                return np.asarray(solve(rhs, None).x[:, :, :n])
+            def inertia(v: np.ndarray) -> np.ndarray:
+                return np.asarray(v @ mass)
 
-            return cls(n, structure.inertia_product(z, p), response)
-        mass, springs = sprung.inertia(z, p), sprung.springs
-
-        def response_with_springs(forces: np.ndarray) -> np.ndarray:
+        def response(forces: np.ndarray) -> np.ndarray:
             rhs = np.zeros((*forces.shape[:2], size))
             given = forces[:, :, n:] / springs.stiffness
             rhs[:, :, :n], rhs[:, :, n:] = forces[:, :, :n], -given @ springs.gaps.T
@@ -114,7 +114,7 @@ class _Moving:
             away = x[:, :, n:] @ springs.gaps / springs.stiffness
             return np.concatenate([x[:, :, :n], given - away], axis=2)
 
-        return cls(n + len(springs.stiffness), lambda v: v @ mass, response_with_springs)
+        return cls(n + len(springs.stiffness), inertia, response)
 
 
 def _ritz(

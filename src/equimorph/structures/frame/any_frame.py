@@ -21,7 +21,7 @@ from equimorph.model import (
 )
 from equimorph.structures.collapse import Shortening
 from equimorph.structures.frame.strength import StressedFrame
-from equimorph.structures.material_points import MaterialPoints, SprungPoints, SupportSprings
+from equimorph.structures.material_points import MaterialPoints, SupportSprings
 from equimorph.structures.network import direction_of_mechanism
 from equimorph.structures.resolution import Refinable
 from equimorph.structures.rod.discretisation import error_by_refinement
@@ -332,7 +332,7 @@ class AnyFrame(StressedFrame, Shortening, Refinable):
         """Stiffness of each spring along an axis, gaps that it opens, and moves of all joints."""
 
     @property
-    def sprung(self) -> SprungPoints | None:
+    def sprung(self) -> MaterialPoints | None:
         """Points of the members, where the unknowns leave springs at supports free."""
         points = self._material
         if points is None:
@@ -340,7 +340,7 @@ class AnyFrame(StressedFrame, Shortening, Refinable):
         starts = np.repeat(self.network.ends[:, 0], len(self.model.mesh.weights))
         each = [(stiff, gaps, moves[starts]) for stiff, gaps, moves in self.springs_of_joints]
         springs = SupportSprings.of(each, self.constraints, self.network.space)
-        return None if springs.follow else SprungPoints(points, springs)
+        return None if springs.follow else replace(points, springs=springs)
 
     @property
     def _material(self) -> MaterialPoints | None:

@@ -7,7 +7,7 @@ import numpy as np
 
 from equimorph.arrays import Float, Lanes, Nodal, Parameters, Scalars, Velocity
 from equimorph.structures.equations import JointEquations
-from equimorph.structures.material_points import MaterialPoints, SprungPoints
+from equimorph.structures.material_points import MaterialPoints
 from equimorph.structures.rod.discretisation import Mesh
 from equimorph.structures.rod.mechanics import PlanarMechanics
 from equimorph.structures.rod.model import RodModel
@@ -102,15 +102,15 @@ class GeneralInertia(JointEquations, PlanarMechanics):
         """(Multipliers, parameters, 1)."""
 
     @property
-    def sprung(self) -> SprungPoints | None:
+    def sprung(self) -> MaterialPoints | None:
         """Its nodes on springs at both ends, or at one where the other end is free."""
 
         def places(z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes nodes 2"]:
             return nodal_places(self.model, self.nodal_angles(z, p), self.scalars(z, p))
 
         springs = self.model.springs_along
-        points = MaterialPoints(self, places, self.mesh.weights)
-        return None if springs.follow else SprungPoints(points, springs)
+        points = MaterialPoints(self, places, self.mesh.weights, springs)
+        return None if springs.follow else points
 
     def inertia(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes unknowns unknowns"]:
         """JᵀWJ of the unknown angles."""

@@ -14,7 +14,7 @@ import numpy as np
 from equimorph.arrays import Float, Lanes, Nodal, Parameters, Velocity
 from equimorph.model import Parameter
 from equimorph.structures.collapse import Shortening
-from equimorph.structures.material_points import SprungPoints
+from equimorph.structures.material_points import MaterialPoints
 from equimorph.structures.rod.discretisation import Mesh
 from equimorph.structures.rod.units import Units
 
@@ -57,17 +57,16 @@ class HeavyRod(Shortening):
 
     @property
     @abstractmethod
-    def sprung_in_lengths(self) -> SprungPoints | None:
+    def sprung_in_lengths(self) -> MaterialPoints | None:
         """Points of a rod of mass 1 on springs that the unknowns leave free; None without these."""
 
     @property
-    def sprung(self) -> SprungPoints | None:
+    def sprung(self) -> MaterialPoints | None:
         """Its points on springs at both ends, or at one where the other end is free."""
-        unit, found = self.units.time(), self.sprung_in_lengths
-        if unit is None or found is None:
+        unit, points = self.units.time(), self.sprung_in_lengths
+        if unit is None or points is None:
             return None
-        points = replace(found.points, masses=unit**2 * found.points.masses)
-        return replace(found, points=points)
+        return replace(points, masses=unit**2 * points.masses)
 
     @property
     def time_unit(self) -> str:

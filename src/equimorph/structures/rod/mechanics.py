@@ -15,7 +15,7 @@ from equimorph.linalg.lanes import over_lanes
 from equimorph.structures.compiled_steps import CompiledSteps
 from equimorph.structures.contract import Symmetry
 from equimorph.structures.equations import Advance, Direction, Enclosed, Equations
-from equimorph.structures.material_points import SprungPoints
+from equimorph.structures.material_points import MaterialPoints
 from equimorph.structures.rod.discretisation import Mesh, error_by_refinement
 from equimorph.structures.rod.planar_energy import PlanarEnergy
 
@@ -169,7 +169,7 @@ class PlanarMechanics(RodMechanics):
         return self.planar_energy.numbers()
 
     @property
-    def sprung(self) -> SprungPoints | None:
+    def sprung(self) -> MaterialPoints | None:
         """Points of a rod of mass 1 on springs that the unknowns leave free; none here."""
         return None
 

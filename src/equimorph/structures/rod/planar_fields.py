@@ -13,7 +13,7 @@ import numpy as np
 from equimorph.arrays import Float, Lanes, Parameters, Values, Velocity
 from equimorph.errors import MissingError
 from equimorph.structures.contract import Readers, Written
-from equimorph.structures.material_points import SprungPoints
+from equimorph.structures.material_points import MaterialPoints
 from equimorph.structures.rod.any_description import RodDescription
 from equimorph.structures.rod.any_rod import AnyRod, Arclengths
 from equimorph.structures.rod.centreline import Centreline
@@ -104,7 +104,7 @@ class Measured(StressedRod):
         return Centreline(fields[:, :, 2:], tangents, left[:, :, None], bending * left, length)
 
     @property
-    def sprung_in_lengths(self) -> SprungPoints | None:
+    def sprung_in_lengths(self) -> MaterialPoints | None:
         """Points of a rod of mass 1 on springs that the unknowns leave free."""
         return self.mechanics.sprung
 

@@ -1,6 +1,7 @@
 """Rods in space as structures: fields along the rod and descriptors, in the user's units."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cached_property
 from typing import ClassVar
 
@@ -11,7 +12,7 @@ from equimorph.arrays import Float, Lanes, Parameters, Values, Velocity
 from equimorph.errors import InputError
 from equimorph.model import Descriptor, remember_call
 from equimorph.structures.contract import Written
-from equimorph.structures.material_points import MaterialPoints, SprungPoints
+from equimorph.structures.material_points import MaterialPoints
 from equimorph.structures.rod.any_rod import Arclengths, Field, Peaks, arclengths
 from equimorph.structures.rod.centreline import Centreline
 from equimorph.structures.rod.extrema import peaks, stations
@@ -87,10 +88,10 @@ class DescribedInSpace(StressedRod):
         return self._material.inertial_force(z, p, velocity)
 
     @property
-    def sprung_in_lengths(self) -> SprungPoints | None:
+    def sprung_in_lengths(self) -> MaterialPoints | None:
         """Points of a rod of mass 1 on springs that the unknowns leave free."""
         springs = self.mechanics.model.springs_along
-        return None if springs.follow else SprungPoints(self._material, springs)
+        return None if springs.follow else replace(self._material, springs=springs)
 
     @property
     def _material(self) -> MaterialPoints:
