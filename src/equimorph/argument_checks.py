@@ -98,13 +98,17 @@ class Entry:
 
     def __init__(self, function: Callable[..., Any]) -> None:
         self._function = function
+        self._admitted: set[tuple[object, ...]] = set()
 
     def admit(  # noqa: C901  # one loop for each way in which Python passes arguments
         self, args: tuple[Any, ...], kwargs: dict[str, Any]
     ) -> tuple[tuple[Any, ...], dict[str, Any]]:
         """Return the arguments, some converted to the form that the function works with."""
         kinds, names = self._kinds, self._names
-        self._check_names(args, kwargs)
+        given = (len(args), *kwargs)
+        if given not in self._admitted:
+            self._check_names(args, kwargs)
+            self._admitted.add(given)
         changed: dict[str, Any] = {}
         for name, value in zip(names, args, strict=False):
             if not kinds[name].fits(value):

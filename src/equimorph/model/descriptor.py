@@ -272,8 +272,10 @@ def are_feasible(
     constraints: Sequence[Constraint], z: Lanes, p: Parameters, slack: float = 0.0
 ) -> Flags:
     """Which states obey all constraints, up to a slack in units of the descriptors."""
-    good = np.ones(len(z), bool)
-    for constraint in constraints:
+    if len(constraints) == 0:
+        return np.ones(len(z), bool)
+    good = constraints[0].excess(z, p) <= slack
+    for constraint in constraints[1:]:
         good[good] = constraint.excess(z[good], p[good]) <= slack
     return good
 
