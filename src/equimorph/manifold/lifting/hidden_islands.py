@@ -48,11 +48,11 @@ Shares = Float[np.ndarray, "n corners"]
 class _Patches(Columns):
     """Simplices on a set: states at their corners, and then at other points nearby.
 
-    sign: of the determinants at the corners of the cell that they lie on; determinants: times that;
-    deep: value below which they dip.
+    unit: the determinant at the first corner of the cell that they lie on; determinants: over that,
+    since those of large structures reach 1e107; deep: value below which they dip.
     """
 
-    sign: ItemValues
+    unit: ItemValues
     deep: ItemValues
     z: Float[np.ndarray, "n points size"]
     p: Float[np.ndarray, "n points parameters"]
@@ -92,12 +92,14 @@ def _of_cells(eset: EquilibriumSet) -> _Patches:
     plain = np.flatnonzero(~singular[eset.cells].any(axis=1))
     around = np.concatenate([eset.cells, _across(eset.cells)], axis=1)[plain]
     values = np.where(around == NOWHERE, np.nan, known[around])
-    sign = np.sign(values[:, 0])
-    values *= sign[:, None]
+    unit = values[:, 0].copy()
+    values *= np.sign(unit)[:, None]
     low = values[:, : eset.cells.shape[1]].min(axis=1)
     varying = np.flatnonzero(np.fmax.reduce(values, axis=1) > VARYING * low)
-    sign, low, around, values = (each[varying] for each in (sign, low, around, values))
-    return _Patches(sign, DEEP * low, vertices.z[around], vertices.p[around], values)
+    unit, low, around, values = (each[varying] for each in (unit, low, around, values))
+    size = np.abs(unit)
+    deep, values = DEEP * low / size, values / size[:, None]
+    return _Patches(unit, deep, vertices.z[around], vertices.p[around], values)
 
 
 def _across(cells: Cells) -> Cells:
@@ -157,10 +159,10 @@ def _inside(
     directions = free_directions(structure, setting.free, len(z))
     guards = Guards(iterations=ITERATIONS)
     found = settle(structure, z, p, directions, guards=guards, frames=False)
-    values = np.repeat(patches.sign, points) * determinants(structure, found.z, found.p)
+    values = determinants(structure, found.z, found.p) / np.repeat(patches.unit, points)
     values[~found.found | ~np.isfinite(values)] = np.nan
     return _Patches(
-        patches.sign,
+        patches.unit,
         patches.deep,
         found.z.reshape(n, points, -1),
         found.p.reshape(n, points, -1),
@@ -177,5 +179,5 @@ def _pattern(d: int) -> Float[np.ndarray, "points corners"]:
 
 def _deepest(setting: Setting, patches: _Patches) -> States:
     """States of simplices at which the determinant is least."""
-    least, every = np.nanargmin(patches.determinants, axis=1), np.arange(len(patches.sign))
+    least, every = np.nanargmin(patches.determinants, axis=1), np.arange(len(patches.unit))
     return States(setting.structure, patches.z[every, least], patches.p[every, least])
