@@ -255,6 +255,8 @@ def test_orbits_are_refused():
     pinned = em.SpatialRod(torsion=0.77, lateral=1.0, phase=True, loads={}, span=0.9)
     with pytest.raises(em.errors.InputError, match="orbit"):
         replay({"nu": 0.8}, pinned.natural_state(), rate=0.1)
+    with pytest.raises(em.errors.InputError, match="orbit"):
+        replay({"nu": 0.8}, pinned.natural_state(), rate=0.1, simulator="own")
 
 
 @pytest.mark.slow

@@ -10,9 +10,10 @@ from equimorph.dynamics.fold_delay import FoldDelay
 from equimorph.dynamics.model import Course, Model, Motion, Plant, Points, Row, stable_near
 from equimorph.dynamics.motion import equilibria_along
 from equimorph.dynamics.plant import mujoco_module
+from equimorph.dynamics.spatial_rods import check_isolated
 from equimorph.dynamics.writer import document
 from equimorph.errors import InputError
-from equimorph.structures import State, States, Structure, Truss
+from equimorph.structures import SpatialRod, State, States, Structure, Truss
 
 FIRST_MODE = 5.0
 """Lowest angular frequency at the start in units of 1/T: about that of a clamped arch."""
@@ -32,6 +33,8 @@ class DirectModel(Model):
                 f"leave free; this {structure.kind} does. Replay its schedule in MuJoCo, or hold "
                 "these supports."
             )
+        if isinstance(structure, SpatialRod):
+            check_isolated(structure, start, self.simulator)
         self.structure = structure
         self.frequency = float(start.batch.natural_frequencies(1)[0, 0])
         self.unit = FIRST_MODE / self.frequency

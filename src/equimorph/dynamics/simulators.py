@@ -30,7 +30,7 @@ def model_of(start: State, simulator: str, links: int) -> Model:
         if isinstance(structure, Rod):
             return LinkageModel(ChainedRod(structure, links))
         if isinstance(structure, SpatialRod):
-            check_isolated(structure, start)
+            check_isolated(structure, start, simulator)
             return LinkageModel(ChainedSpatialRod(structure, links))
         if isinstance(structure, Frame):
             return LinkageModel(ChainedFrame(structure, links))

@@ -282,7 +282,7 @@ def _slides(made: Construction[Build], links: int) -> Float[np.ndarray, "links 3
     return out
 
 
-def check_isolated(rod: SpatialRod, start: State) -> None:
+def check_isolated(rod: SpatialRod, start: State, simulator: str) -> None:
     """Refuse states that may be turned about the axis of the clamps for nothing.
 
     Such are states of orbits, and all of a rod with a phase condition.
@@ -291,8 +291,8 @@ def check_isolated(rod: SpatialRod, start: State) -> None:
     pinned = isinstance(mechanics, PinnedMechanics)
     if pinned or on_orbit(mechanics, start.z[None], start.p[None])[0]:
         raise InputError(
-            '`simulator` must cover the rod; got "mujoco" for a state of an orbit, which may turn '
-            "about the axis of the clamps for nothing. Give the bending stiffnesses different "
+            f"`simulator` must cover the rod; got {simulator!r} for a state of an orbit, which may "
+            "turn about the axis of the clamps for nothing. Give the bending stiffnesses different "
             "values, or the rod a load across the axis."
         )
 

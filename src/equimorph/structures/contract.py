@@ -14,7 +14,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
-from equimorph.arrays import Flags, Float, Int, Lanes, Parameters, Values
+from equimorph.arrays import Flags, Float, Int, Lanes, Parameters, Values, Velocity
 from equimorph.errors import InputError, suggestion
 from equimorph.model import (
     Call,
@@ -191,6 +191,11 @@ class Structure(Rebuilt, Inertial):
         Lifts keep to one phase (`pick_on_orbits`); searches and sets refuse such parameters.
         """
         return np.zeros(len(p), bool)
+
+    def along_orbits(self, z: Lanes, p: Parameters) -> Velocity:
+        """Rates of the unknowns at which a continuous symmetry moves states; 0 where none does."""
+        del p
+        return np.zeros((len(z), self.unknowns))
 
     def pick_on_orbits(self, z: Lanes, p: Parameters, towards: Parameters) -> Lanes:
         """States from which paths to other parameters begin; by default the given ones.

@@ -38,7 +38,8 @@ def vibrations(structure: Structure, z: Lanes, p: Parameters, count: int) -> Vib
     """Lowest modes of stable states, by subspace iteration with the constrained Hessian.
 
     Each step solves with F_z and takes the best combinations (Rayleigh and Ritz) of all vectors.
-    Springs at supports that the unknowns leave free have coordinates of their own.
+    Springs at supports that the unknowns leave free have coordinates of their own. States on orbits
+    vibrate across these, orthogonal to them in M: the turn along them is no vibration.
 
     Raises
     ------
@@ -62,6 +63,7 @@ def vibrations(structure: Structure, z: Lanes, p: Parameters, count: int) -> Vib
         raise InputError(f"`count` must be from 1 to {free}, the free movements; got {count!r}.")
     width = min(count + GUARD, moving.coordinates)
     vectors = np.random.default_rng(0).normal(size=(len(z), width, moving.coordinates))
+    vectors = moving.across(vectors)
     last = np.zeros((len(z), count))
     for _ in range(SWEEPS):
         forces = moving.inertia(vectors)
@@ -90,10 +92,11 @@ class _Moving:
     coordinates: int
     inertia: Product
     response: Product
+    across: Product
 
     @classmethod
     def of(cls, structure: Structure, z: Lanes, p: Parameters) -> "_Moving":
-        """Of states; the response to forces keeps the constraints."""
+        """Of states; the response to forces keeps the constraints, and lies across orbits."""
         n, size = structure.unknowns, structure.size
         solve = structure.linear_system(z, p, np.zeros((len(z), 0, p.shape[1]))).solve
         sprung = structure.sprung
@@ -112,9 +115,19 @@ class _Moving:
             rhs[:, :, :n], rhs[:, :, n:] = forces[:, :, :n], -given @ springs.gaps.T
             x = solve(rhs, None).x
             away = x[:, :, n:] @ springs.gaps / springs.stiffness
-            return np.concatenate([x[:, :, :n], given - away], axis=2)
+            return across(np.concatenate([x[:, :, :n], given - away], axis=2))
 
-        return cls(n + len(springs.stiffness), inertia, response)
+        count = n + len(springs.stiffness)
+        along = np.zeros((len(z), 1, count))
+        along[:, 0, :n] = structure.along_orbits(z, p)
+        heavy = inertia(along)
+        weight = heavy @ along.transpose(0, 2, 1)
+        share = np.divide(along, weight, out=np.zeros_like(along), where=weight > 0.0)
+
+        def across(v: np.ndarray) -> np.ndarray:
+            return np.asarray(v - (v @ heavy.transpose(0, 2, 1)) @ share)
+
+        return cls(count, inertia, response, across)
 
 
 def _ritz(
@@ -124,12 +137,16 @@ def _ritz(
 ) -> tuple[Float[np.ndarray, "lanes w"], Float[np.ndarray, "lanes w n"]]:
     """Values 1/ω², descending, and the best combinations: ``heavy c = stiff c/ω²``.
 
-    `stiff` is positive in exact arithmetic; directions in which it is round-off are left out.
+    `stiff` is positive in exact arithmetic; directions in which it is round-off are left out. All
+    vectors count as equally long in it, whose sizes differ by the squares of their frequencies.
     """
+    size = np.sqrt(np.einsum("lkk->lk", stiff))
+    by = np.divide(1.0, size, out=np.zeros_like(size), where=size > 0.0)
+    stiff, heavy = (by[:, :, None] * each * by[:, None, :] for each in (stiff, heavy))
     scale, basis = np.linalg.eigh(0.5 * (stiff + stiff.transpose(0, 2, 1)))
     keep = scale > 1e-14 * scale[:, -1:]
     root = np.where(keep, 1.0 / np.sqrt(np.where(keep, scale, 1.0)), 0.0)
     reduce = basis * root[:, None, :]
     values, turned = np.linalg.eigh(reduce.transpose(0, 2, 1) @ heavy @ reduce)
     best = (reduce @ turned)[:, :, ::-1]
-    return values[:, ::-1], best.transpose(0, 2, 1) @ vectors
+    return values[:, ::-1], best.transpose(0, 2, 1) @ (by[:, :, None] * vectors)

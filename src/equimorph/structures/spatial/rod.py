@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
-from equimorph.arrays import Flags, Float, Lanes, Parameters, Values
+from equimorph.arrays import Flags, Float, Lanes, Parameters, Values, Velocity
 from equimorph.errors import InputError
 from equimorph.model import Drawing, parameter_vector
 from equimorph.structures.discrete import correct_at_parameters
@@ -297,6 +297,10 @@ class SpatialRod(DescribedInSpace):
         """Whether states off the x axis may be turned about it for nothing."""
         rod = self.mechanics
         return rod.have_orbits(p) if isinstance(rod, OrbitMechanics) else np.zeros(len(p), bool)
+
+    def along_orbits(self, z: Lanes, p: Parameters) -> Velocity:
+        """Rates at which states off the x axis turn about it, where they may for nothing."""
+        return self.mechanics.along_orbits(z, p)
 
     def pick_on_orbits(self, z: Lanes, p: Parameters, towards: Parameters) -> Lanes:
         """States on orbits along the way are turned about the axis to the phase condition."""
