@@ -14,10 +14,9 @@ from equimorph.manifold import (
     stability_distance,
 )
 from equimorph.manifold.complex.excerpts import fabric_of
-from equimorph.manifold.complex.marked_complex import squared_sides
 from equimorph.manifold.geometry.exact_points import Aim, correct_points
 from equimorph.manifold.geometry.setting import embed
-from equimorph.manifold.geometry.simplices import volumes
+from equimorph.manifold.geometry.simplices import squared_sides, volumes
 from equimorph.manifold.geometry.topology import (
     adjacency,
     euler_characteristic,

@@ -21,7 +21,7 @@ from equimorph.charts.domain import (
 )
 from equimorph.charts.location import Cells, EdgeKind, Found
 from equimorph.charts.preparation import cut_along_crossings, flip_inverted_triangles
-from equimorph.charts.singular_pairs import SingularPairs
+from equimorph.charts.singular_pairs import SingularPairs, pairs_of
 from equimorph.charts.twins import add_twins
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet, Level, singular_set
@@ -322,11 +322,8 @@ class DescriptorChart(Chart):
         plain = Cells(eset, self.coordinates, numbers)
         if len(self.names) != 2:
             return plain
-        fixed = facets_of(eset.folds, 2)
-        flipped, sheet = eset.cells.copy(), sheet_labels(plain)
-        for label in range(sheet.max() + 1):
-            own = sheet == label
-            flipped[own] = flip_inverted_triangles(flipped[own], plain.values, fixed)
+        fixed, sheet = facets_of(eset.folds, 2), sheet_labels(plain)
+        flipped = flip_inverted_triangles(eset.cells, plain.values, fixed, sheet)
         return Cells(replace(eset, cells=flipped), self.coordinates, numbers)
 
     @cached_property
@@ -336,14 +333,12 @@ class DescriptorChart(Chart):
 
     @cached_property
     def _pairs(self) -> SingularPairs | None:
-        """Pairs beside the states at which the coordinates fold, if they do."""
-        states = self.singular.states
-        return SingularPairs(self.cells, states) if len(states) else None
+        return pairs_of(self.cells)
 
     def find(self, points: Points) -> Found:
         """All states of the chart's cells over points, and of pairs that lie beside these cells.
 
-        A second state is found from the curve on which the coordinates fold, or from the first one.
+        A second state is found from where the coordinates nearly fold, or from the first one.
         """
         found = super().find(points)
         if self._pairs is not None:

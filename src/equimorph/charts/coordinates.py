@@ -32,6 +32,8 @@ QUICK = Guards(iterations=8, longest=np.inf, too_long=0.3, converged=1e-7, contr
 """Over parameters: a long step means a fold near by, where this does not work."""
 ON_SET = Guards(iterations=20, longest=0.3, converged=1e-7, contraction=0.7, free=3)
 """Along the set, where folds are no obstacle."""
+ONTO_SET = Guards(iterations=30, longest=0.3, converged=1e-7)
+"""Across the set; the last correction is 1e-7, which leaves an error at round-off."""
 
 Square = Float[np.ndarray, "lanes d d"]
 
@@ -91,6 +93,14 @@ def solve_on_the_set(
     directions = free_directions(structure, setting.free, len(wanted))
     frame = embedded_planes(structure, setting.free, rows)
     return settle(structure, z, p, directions, [values], ON_SET, frame, frames=False)
+
+
+def settle_on_set(setting: Setting, z: Lanes, p: Parameters, rows: Rows) -> Settled:
+    """States of the set orthogonally above points near it."""
+    structure, free = setting.structure, setting.free
+    directions = free_directions(structure, free, len(z))
+    frame = embedded_planes(structure, free, rows)
+    return settle(structure, z, p, directions, [], ONTO_SET, frame)
 
 
 def frames_anywhere(setting: Setting, z: Lanes, p: Parameters) -> Frames:

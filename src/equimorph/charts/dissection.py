@@ -20,10 +20,11 @@ from equimorph.charts.preparation import (
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.complex.equilibrium_set import check_cells
 from equimorph.manifold.complex.excerpts import Excerpt, excerpt_of
-from equimorph.manifold.complex.marked_complex import Fabric, squared_sides
+from equimorph.manifold.complex.marked_complex import Fabric
 from equimorph.manifold.complex.vertices import Vertices, free_vertices
 from equimorph.manifold.geometry.exact_points import Corrected
 from equimorph.manifold.geometry.points import on_fold
+from equimorph.manifold.geometry.simplices import squared_sides
 from equimorph.manifold.geometry.topology import chains, flags_of, keys_of, labels
 from equimorph.manifold.lookup.exact_states import exact_states
 from equimorph.manifold.queries.levels import whole_set
@@ -173,10 +174,7 @@ class _Work:
         """The same with fewer triangles that chords of curved folds have turned over."""
         fabric = self.fabric
         places = fabric.vertices.p[:, fabric.setting.free]
-        corners = fabric.cells.copy()
-        for chart in range(len(self.origin)):
-            own = np.flatnonzero(fabric.cell_index == chart)
-            corners[own] = flip_inverted_triangles(corners[own], places, fabric.facets)
+        corners = flip_inverted_triangles(fabric.cells, places, fabric.facets, fabric.cell_index)
         squared = squared_sides(fabric.vertices.place, corners)
         return replace(self, fabric=replace(fabric, cells=corners, squared=squared))
 

@@ -31,7 +31,7 @@ from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.complex.kept_tables import adjacency_of, places_of
 from equimorph.manifold.geometry.points import VertexKind, are_singular, on_fold
 from equimorph.manifold.geometry.setting import embed
-from equimorph.manifold.geometry.simplices import longest_sides, middles, volumes
+from equimorph.manifold.geometry.simplices import longest_sides, middles, sizes_of, volumes
 from equimorph.manifold.geometry.topology import (
     Adjacency,
     adjacency,
@@ -280,19 +280,24 @@ class Cells:
         return longest_sides(places_of(self.eset), self.corners)
 
     @cached_property
+    def extents(self) -> Float[np.ndarray, " own"]:
+        """Lengths, areas or volumes of the cells in the metric."""
+        return sizes_of(places_of(self.eset), self.corners)
+
+    @cached_property
     def ranges(self) -> Place:
         """Ranges of the coordinates over the set."""
         return np.asarray(np.maximum(np.ptp(self.values, axis=0), 1e-300))
 
     @cached_property
-    def _middles(self) -> cKDTree:
-        setting, points = self.coordinates.setting, self.eset.points
-        return cKDTree(middles(embed(setting, points.z, points.p), self.corners))
+    def tree(self) -> cKDTree:
+        """The middles of the cells in the metric."""
+        return cKDTree(middles(places_of(self.eset), self.corners))
 
     def nearest(self, states: States) -> Items:
         """Places, among these, of the cells whose middles are nearest to states."""
         place = embed(self.coordinates.setting, states.z, states.p)
-        return np.asarray(self._middles.query(place)[1])
+        return np.asarray(self.tree.query(place)[1])
 
     def planes(self, cell: Int[np.ndarray, " hits"]) -> Float[np.ndarray, "hits d coordinates"]:
         """Orthonormal bases of the planes of cells."""

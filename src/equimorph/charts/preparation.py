@@ -1,10 +1,10 @@
 """Sets made ready for charts: cut along crossings, with vertices at cusps, without folded cells."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from equimorph.arrays import Bool, Facets, Float, Int, ItemFlags, Items, Pairs, VertexNumbers
+from equimorph.arrays import Bool, Facets, Float, Int, ItemFlags, Items, Pairs, Some, VertexNumbers
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.complex.excerpts import Excerpt, excerpt_of
 from equimorph.manifold.complex.kept_tables import from_cache, kept
@@ -22,12 +22,15 @@ from equimorph.manifold.geometry.topology import (
     keys_of,
     orientation,
     pieces,
+    runs,
 )
 from equimorph.manifold.queries.cusps import cusps_on_edges
 from equimorph.manifold.queries.levels import whole_set
 
 ROUNDS = 6
 """Most rounds of flips."""
+OPPOSITE = [[1, 2], [2, 0], [0, 1]]
+"""Edges of triangles, by the corner opposite to them."""
 
 
 def cut_along_crossings(eset: EquilibriumSet) -> EquilibriumSet:
@@ -113,7 +116,10 @@ def _with_cusps(eset: EquilibriumSet) -> EquilibriumSet | None:
 
 
 def flip_inverted_triangles(
-    corners: Int[np.ndarray, "C 3"], places: Float[np.ndarray, "V 2"], fixed: Pairs
+    corners: Int[np.ndarray, "C 3"],
+    places: Float[np.ndarray, "V 2"],
+    fixed: Pairs,
+    sheet: Int[np.ndarray, " C"],
 ) -> Int[np.ndarray, "C 3"]:
     """Flip edges so that fewer triangles overlap their neighbours in the plane.
 
@@ -123,86 +129,112 @@ def flip_inverted_triangles(
     Parameters
     ----------
     corners
-        Triangles of a sheet that can be oriented.
+        Triangles of sheets that can be oriented.
     places
         Places of all vertices in the plane.
     fixed
-        Edges that stay.
+        Edges that stay, beside those between sheets.
+    sheet
+        Sheet of each triangle, within which it overlaps others.
     """
-    signs, _ = orientation(corners, adjacency(corners))
+    whole, base = adjacency(corners), len(places)
+    a, b = whole.links.T
+    apart = np.isin(np.arange(len(whole.facets)), whole.across[sheet[a] != sheet[b]])
+    signs = orientation(corners, _without(whole, apart))[0]
     area = volumes(places[corners]) * signs
     out = corners.copy()
-    turned = signs * np.sign(area.sum()) < 0
+    turned = signs * np.sign(np.bincount(sheet, area))[sheet] < 0
     out[turned] = out[turned][:, ::-1]
-    base = len(places)
-    kept = set(keys_of(fixed, base).tolist())
+    kept, outer = keys_of(fixed, base), keys_of(whole.facets[apart], base)
     for _ in range(ROUNDS):
         area = volumes(places[out])
         bad = np.flatnonzero(area < 0.0)
-        if len(bad) == 0 or not _flip_once(out, places, bad[np.argsort(area[bad])], kept):
+        bad = bad[np.argsort(area[bad], kind="stable")]
+        if len(bad) == 0 or not _flip_once(out, places, bad, kept, outer):
             break
     return out
 
 
+def _without(whole: Adjacency, apart: Bool[np.ndarray, " F"]) -> Adjacency:
+    """Adjacency that does not connect cells across some facets."""
+    some = ~apart[whole.across]
+    return replace(whole, links=whole.links[some], across=whole.across[some])
+
+
 def _flip_once(
-    corners: Int[np.ndarray, "C 3"], places: Float[np.ndarray, "V 2"], bad: Items, kept: set[int]
+    corners: Int[np.ndarray, "C 3"],
+    places: Float[np.ndarray, "V 2"],
+    bad: Items,
+    kept: Int[np.ndarray, " kept"],
+    outer: Int[np.ndarray, " outer"],
 ) -> int:
     """Flip an edge of each bad triangle where that helps; changes `corners`."""
-    around: dict[int, list[int]] = {}
-    base = len(places)
-    near = np.flatnonzero(np.isin(corners, corners[bad]).any(axis=1)).tolist()
-    for cell in near:
-        a, b, c = corners[cell].tolist()
-        for pair in ((a, b), (b, c), (c, a)):
-            around.setdefault(min(pair) * base + max(pair), []).append(cell)
+    base, near = len(places), np.zeros(len(places), bool)
+    near[corners[bad]] = True
+    cells = np.flatnonzero(near[corners].any(axis=1))
+    keys = np.concatenate([keys_of(corners[cells][:, k], base) for k in OPPOSITE])
+    around = _Around(keys, np.tile(cells, 3)).without(outer)
+    flips = _best_flips(corners, places, bad, around, kept)
     touched: set[int] = set()
     count = 0
-    for cell in bad.tolist():
-        best = _best_flip(corners, places, cell, around, kept)
-        if best is None or touched & {cell, best[0]}:
+    for cell, other, *new in zip(*(each.tolist() for each in flips), strict=True):
+        if touched & {cell, other}:
             continue
-        other, first, second = best
-        corners[cell], corners[other] = first, second
-        touched |= {cell, other}
+        corners[cell], corners[other] = new
         # their neighbours are computed again in the next round
-        keys = _keys(first, base) + _keys(second, base)
-        touched |= {beside for key in keys for beside in around.get(key, ())}
+        sides = np.array(new)[:, OPPOSITE].reshape(-1, 2)
+        touched |= {cell, other, *around.beside(keys_of(sides, base)).tolist()}
         count += 1
     return count
 
 
-def _area(places: Float[np.ndarray, "V 2"], a: int, b: int, c: int) -> float:
-    """Signed area of a single triangle; `volumes` takes ten times as long."""
-    (x, y), (x_b, y_b), (x_c, y_c) = places[[a, b, c]].tolist()
-    area: float = 0.5 * ((x_b - x) * (y_c - y) - (y_b - y) * (x_c - x))
-    return area
+@dataclass(frozen=True)
+class _Around:
+    """Edges of cells by their keys, sorted, and the cell of each."""
+
+    keys: Items
+    cells: Items
+
+    def without(self, others: Items) -> "_Around":
+        """The others, sorted."""
+        left = np.flatnonzero(~np.isin(self.keys, others))
+        left = left[np.argsort(self.keys[left], kind="stable")]
+        return _Around(self.keys[left], self.cells[left])
+
+    def beside(self, keys: Items) -> Some:
+        """Cells that have edges."""
+        first, last = (np.searchsorted(self.keys, keys, side) for side in ("left", "right"))
+        return np.asarray(self.cells[runs(first, last - first)[1]])
+
+    def others(self, keys: Items, cells: Items) -> tuple[Some, Some]:
+        """Which cells share an edge with just one other cell, and this one."""
+        first, last = (np.searchsorted(self.keys, keys, side) for side in ("left", "right"))
+        some = np.flatnonzero(last - first == 2)
+        first = first[some]
+        return some, self.cells[first] + self.cells[first + 1] - cells[some]
 
 
-def _keys(triangle: tuple[int, int, int], base: int) -> list[int]:
-    a, b, c = triangle
-    return [min(p) * base + max(p) for p in ((a, b), (b, c), (c, a))]
-
-
-def _best_flip(
+def _best_flips(
     corners: Int[np.ndarray, "C 3"],
     places: Float[np.ndarray, "V 2"],
-    cell: int,
-    around: dict[int, list[int]],
-    kept: set[int],
-) -> tuple[int, tuple[int, int, int], tuple[int, int, int]] | None:
-    """Neighbour with which to flip, and both new triangles."""
-    base, own = len(places), corners[cell].tolist()
-    best = None
-    for k in range(3):
-        c, a, b = own[k], own[(k + 1) % 3], own[(k + 2) % 3]
-        key = min(a, b) * base + max(a, b)
-        others = [other for other in around.get(key, ()) if other != cell]
-        if key in kept or len(others) != 1:
-            continue
-        d = next(v for v in corners[others[0]].tolist() if v not in {a, b})
-        new = ((a, d, c), (d, b, c))
-        pair = (own, corners[others[0]].tolist())
-        before, after = (min(_area(places, *each) for each in both) for both in (pair, new))
-        if after > before and (best is None or after > best[0]):
-            best = (after, others[0], *new)
-    return None if best is None else best[1:]
+    bad: Items,
+    around: _Around,
+    kept: Int[np.ndarray, " kept"],
+) -> tuple[Some, Some, Int[np.ndarray, "some 3"], Int[np.ndarray, "some 3"]]:
+    """Bad triangles, neighbours with which to flip them, and both new triangles."""
+    base, before = len(places), volumes(places[corners[bad]])
+    worst, other = np.full(len(bad), -np.inf), np.full(len(bad), -1)
+    new = np.zeros((2, len(bad), 3), int)
+    for k, opposite in enumerate(OPPOSITE):
+        keys = keys_of(corners[bad][:, opposite], base)
+        own, beside = around.others(np.where(np.isin(keys, kept), -1, keys), bad)
+        c, a, b = corners[bad[own, None], [k, *opposite]].T
+        d = corners[beside].sum(axis=1) - a - b
+        pair = np.array([[a, d, c], [d, b, c]]).transpose(0, 2, 1)
+        least = np.minimum(*(volumes(places[each]) for each in pair))
+        good = least > np.minimum(before[own], volumes(places[corners[beside]]))
+        good = np.flatnonzero(good & (least > worst[own]))
+        own = own[good]
+        worst[own], other[own], new[:, own] = least[good], beside[good], pair[:, good]
+    some = np.flatnonzero(other >= 0)
+    return bad[some], other[some], new[0, some], new[1, some]

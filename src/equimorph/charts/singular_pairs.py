@@ -1,9 +1,10 @@
-"""Pairs of states beside a singular curve, at which coordinates fold: found from the curve itself.
+"""Pairs of states beside a singular curve, at which coordinates fold: found from states near it.
 
-Near an exact state at which the Jacobian J of the coordinates S has the null direction v, with
-uᵀJ = 0, states with the coordinates S₀ + r lie at η + ξ v, where η = J⁺ r and ξ solves
+Let u, v be the singular vectors of the least singular value σ of the Jacobian J of the coordinates
+S at a state near the curve. States with the coordinates S₀ + r lie at η + ξ v, where η = J⁺ r
+without σ and ξ solves
 
-    ½ (η + ξ v)ᵀ H (η + ξ v) = u·r ,   H = u·D²S .
+    σ ξ + ½ (η + ξ v)ᵀ H (η + ξ v) = u·r ,   H = u·D²S .
 
 Cells are flat; close to the curve both states of a pair may lie outside of the images of all cells,
 or one of them alone, and the other would pass for the only one.
@@ -15,16 +16,19 @@ from functools import cached_property
 import numpy as np
 from scipy.spatial import cKDTree
 
-from equimorph.arrays import Float, Frames, Items, Place, Places, Points
-from equimorph.charts.coordinates import Coordinates, solve_on_the_set
+from equimorph.arrays import Float, Frames, Items, Place, Places, Points, Rows, Values
+from equimorph.charts.coordinates import Coordinates, Square, settle_on_set, solve_on_the_set
 from equimorph.charts.location import Cells, Found
+from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.geometry.tangents import frames_in_embedding, split_step, tangent_frames
 from equimorph.manifold.lookup.cell_index import Hits
 from equimorph.structures import States, join_states
 
-NEIGHBOURS = 4
-"""Singular states from which the pair over a point is predicted."""
+NEIGHBOURS = 8
+"""Nearly singular states from which the pair over a point is predicted."""
+NEARLY = 0.3
+"""Share of det J to which it falls from one cell to the next where it may vanish beside them."""
 REACH = 1.0
 """Longest predicted step, in the largest sizes of cells."""
 STEP = 1e-3
@@ -35,31 +39,35 @@ Numbers = Items
 
 @dataclass(frozen=True, eq=False)
 class _Bend:
-    """How the coordinates fold at singular states; J in ranges of the coordinates.
+    """How the coordinates bend at nearly singular states; J in ranges of the coordinates.
 
-    slope: J⁺ without the null direction. normal: u. null: v. curvature: H.
+    slope: J⁺ without v. normal: u. least: σ. null: v. curvature: H.
     """
 
     slope: Float[np.ndarray, "singular d d"]
     normal: Float[np.ndarray, "singular d"]
+    least: Values
     null: Float[np.ndarray, "singular d"]
     curvature: Float[np.ndarray, "singular d d"]
 
 
 @dataclass(frozen=True, eq=False)
 class SingularPairs:
-    """Search for pairs of states beside the singular states of some coordinates.
+    """Search for pairs of states beside the nearly singular states of some coordinates.
 
     Parameters
     ----------
     cells
         Cells of the chart.
     states
-        Exact states at which its coordinates fold.
+        States near which its coordinates fold.
+    rows
+        Planes near the tangent spaces there.
     """
 
     cells: Cells
     states: States
+    rows: Rows
 
     @property
     def coordinates(self) -> Coordinates:
@@ -72,40 +80,56 @@ class SingularPairs:
 
     @cached_property
     def _frames(self) -> Frames:
-        """Tangent spaces at the singular states, from the planes of the nearest cells."""
-        setting = self.coordinates.setting
-        cell = self.cells.nearest(self.states)
-        return tangent_frames(setting, self.states.z, self.states.p, self.cells.planes(cell))
+        """Tangent spaces at the states."""
+        return tangent_frames(self.coordinates.setting, self.states.z, self.states.p, self.rows)
 
     @cached_property
     def _tree(self) -> cKDTree:
         return cKDTree(self.coordinates(self.states.z, self.states.p) / self._ranges)
 
     @cached_property
-    def _bend(self) -> _Bend:
+    def _values(self) -> tuple[Square, np.ndarray, Square]:
+        """Singular vectors and values of J."""
         left, size, right = np.linalg.svd(self._jacobian(self.states.z, self.states.p))
-        normal, null = left[:, :, -1], right[:, -1]
+        return left, size, right
+
+    @cached_property
+    def _bend(self) -> _Bend:
+        left, size, right = self._values
         inverse = np.zeros_like(size)
         inverse[:, :-1] = 1.0 / np.maximum(size[:, :-1], 1e-300)
         slope = np.einsum("nkj,nk,nik->nji", right, inverse, left)
-        columns = []
-        for k in range(size.shape[1]):
-            dz, dp = split_step(self.coordinates.setting, STEP * self._frames[:, k])
-            ahead, behind = (
-                np.einsum("ni,nij->nj", normal, self._jacobian(z, p))
-                for z, p in (
-                    (self.states.z + dz, self.states.p + dp),
-                    (self.states.z - dz, self.states.p - dp),
-                )
-            )
-            columns.append((ahead - behind) / (2.0 * STEP))
-        return _Bend(slope, normal, null, np.stack(columns, axis=2))
+        columns = [self._change(self._frames[:, k]) for k in range(size.shape[1])]
+        return _Bend(slope, left[:, :, -1], size[:, -1], right[:, -1], np.stack(columns, axis=2))
 
-    def _jacobian(self, z: np.ndarray, p: np.ndarray) -> Float[np.ndarray, "singular d d"]:
+    def _change(self, tangent: Float[np.ndarray, "n full"]) -> Float[np.ndarray, "n d"]:
+        """Derivative of uᵀJ along tangents."""
+        dz, dp = split_step(self.coordinates.setting, STEP * tangent)
+        left, size, right = self._values
+        there = self._jacobian(self.states.z + dz, self.states.p + dp)
+        here = size[:, -1, None] * right[:, -1]
+        return np.asarray((np.einsum("ni,nij->nj", left[:, :, -1], there) - here) / STEP)
+
+    def _jacobian(self, z: np.ndarray, p: np.ndarray) -> Square:
         """Derivatives of the coordinates, in their ranges, along tangents."""
         setting = self.coordinates.setting
         frames = tangent_frames(setting, z, p, frames_in_embedding(setting, self._frames))
         return np.asarray(self.coordinates.derivative(z, p, frames) / self._ranges[:, None])
+
+    def nearer(self) -> "SingularPairs":
+        """Search from where short steps of Newton's method along v take the states."""
+        setting, (_, size, right) = self.coordinates.setting, self._values
+        null = np.einsum("nd,ndf->nf", right[:, -1], self._frames)
+        bend = np.einsum("nd,nd->n", self._change(null), right[:, -1])
+        with np.errstate(divide="ignore", invalid="ignore"):
+            t = -size[:, -1] / bend
+        some = np.flatnonzero(np.abs(t) <= self._longest)
+        dz, dp = split_step(setting, t[some, None] * null[some])
+        states, rows = self.states[some], frames_in_embedding(setting, self._frames[some])
+        moved = settle_on_set(setting, states.z + dz, states.p + dp, rows)
+        found = np.flatnonzero(moved.found)
+        states = States(states.structure, moved.z[found], moved.p[found])
+        return SingularPairs(self.cells, states, rows[found])
 
     def add_to(self, found: Found, points: Points) -> Found:
         """States found over points, and those of pairs beside the singular states."""
@@ -144,7 +168,7 @@ class SingularPairs:
             np.einsum("ni,nij,nj->n", one, curvature, other)
             for one, other in ((null, null), (null, along), (along, along))
         )
-        c = 0.5 * c - (bend.normal[near] * rest).sum(axis=1)
+        b, c = b + bend.least[near], 0.5 * c - (bend.normal[near] * rest).sum(axis=1)
         with np.errstate(divide="ignore", invalid="ignore"):
             # the sign of the discriminant is not certain where it is small: Newton decides
             half, middle = np.sqrt(np.abs(b**2 - 2.0 * a * c)) / np.abs(a), -b / a
@@ -152,6 +176,24 @@ class SingularPairs:
         good = np.max([np.linalg.norm(step, axis=1) for step in steps], axis=0) <= self._longest
         both = np.concatenate([step[good] for step in steps]).reshape(-1, d)
         return np.tile(point[good], 2), np.tile(near[good], 2), both
+
+
+def pairs_of(cells: Cells) -> SingularPairs | None:
+    """Search for pairs where the coordinates of cells fold, if they do.
+
+    It begins at vertices of facets across which det J changes its sign, or nearly falls to zero.
+    """
+    density = np.abs(cells.turn) / np.maximum(cells.extents, 1e-300)
+    a, b = density[cells.whole.links].T
+    near = cells.turning.copy()
+    near[cells.whole.across[np.minimum(a, b) < NEARLY * np.maximum(a, b)]] = True
+    vertices = np.unique(cells.whole.facets[near])
+    vertices = vertices[cells.eset.kinds[vertices] != VertexKind.CROSSING]
+    largest, order = np.zeros(len(cells.eset.points), int), np.argsort(cells.extents, kind="stable")
+    largest[cells.corners[order]] = order[:, None]
+    rows = cells.planes(largest[vertices])
+    found = SingularPairs(cells, cells.eset.points[vertices], rows).nearer()
+    return found if len(found.states) else None
 
 
 def unite(cells: Cells, first: Found, second: Found) -> Found:

@@ -8,11 +8,9 @@ set on both sides along v, so that no singular state has to be known.
 import numpy as np
 
 from equimorph.arrays import Float, Items, Lanes, Parameters, Points, Rows
-from equimorph.charts.coordinates import Coordinates, solve_on_the_set
+from equimorph.charts.coordinates import Coordinates, settle_on_set, solve_on_the_set
 from equimorph.charts.location import Cells, Found
 from equimorph.charts.singular_pairs import unite
-from equimorph.equilibria.settle import Guards, Settled, embedded_planes, free_directions, settle
-from equimorph.manifold.geometry.setting import Setting
 from equimorph.manifold.geometry.tangents import split_step, tangent_frames
 from equimorph.structures import States
 
@@ -20,8 +18,6 @@ STEP = 0.02
 """Step along the set, in the metric, by which the bending of the coordinates is measured."""
 FARTHEST = 0.5
 """Distance along the set, in the metric, within which a second state is looked for."""
-GUARDS = Guards(iterations=30, longest=0.3, converged=1e-7)
-"""The last correction is 1e-7, so that Newton's method leaves an error at round-off."""
 
 
 def add_twins(cells: Cells, found: Found, points: Points) -> Found:
@@ -59,7 +55,7 @@ def _guesses(
     beside_z, beside_p = (
         np.concatenate([each - STEP * d, each + STEP * d]) for each, d in ((z, dz), (p, dp))
     )
-    there = _onto_set(setting, beside_z, beside_p, np.concatenate([rows, rows]))
+    there = settle_on_set(setting, beside_z, beside_p, np.concatenate([rows, rows]))
     below, above = np.split(coordinates(there.z, there.p) / ranges, 2)
     second = (below - 2.0 * coordinates(z, p) / ranges + above) / STEP**2
     bend = np.einsum("lm,lm->l", left[:, :, -1], second)
@@ -68,11 +64,3 @@ def _guesses(
     near = np.flatnonzero(np.abs(t) < FARTHEST)
     move = t[near, None]
     return z[near] + move * dz[near], p[near] + move * dp[near], near
-
-
-def _onto_set(setting: Setting, z: Lanes, p: Parameters, rows: Rows) -> Settled:
-    """States of the set orthogonally above points near it."""
-    structure, free = setting.structure, setting.free
-    directions = free_directions(structure, free, len(z))
-    frame = embedded_planes(structure, free, rows)
-    return settle(structure, z, p, directions, [], GUARDS, frame)

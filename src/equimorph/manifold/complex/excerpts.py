@@ -24,7 +24,6 @@ from equimorph.manifold.complex.marked_complex import (
     Fabric,
     FacetMark,
     first_copies_of,
-    squared_sides,
 )
 from equimorph.manifold.complex.vertices import (
     Vertices,
@@ -33,6 +32,7 @@ from equimorph.manifold.complex.vertices import (
     vertices_of,
 )
 from equimorph.manifold.geometry.points import VertexKind, on_fold
+from equimorph.manifold.geometry.simplices import squared_sides
 from equimorph.manifold.geometry.tangents import best_corners
 from equimorph.manifold.geometry.topology import (
     Adjacency,

@@ -27,9 +27,10 @@ from equimorph.manifold.complex.description import Complex
 from equimorph.manifold.complex.vertices import (
     Vertices,
 )
-from equimorph.manifold.geometry.kernels import cut_rows, look_back, number_edges, square_sides
+from equimorph.manifold.geometry.kernels import cut_rows, look_back, number_edges
 from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.setting import Setting
+from equimorph.manifold.geometry.simplices import squared_sides
 from equimorph.manifold.geometry.tangents import Ends
 from equimorph.manifold.geometry.topology import (
     keys_of,
@@ -228,16 +229,6 @@ def first_copies_of(shared: VertexNumbers) -> VertexNumbers:
         _, first, inverse = np.unique(shared[copies], return_index=True, return_inverse=True)
         own[copies] = copies[first[inverse]]
     return own
-
-
-def squared_sides(
-    place: Float[np.ndarray, "V coordinates"], cells: Int[np.ndarray, "n corners"]
-) -> Float[np.ndarray, "n sides"]:
-    """Squared lengths of the sides 01, 02, 12 and so on of cells."""
-    corners = cells.shape[1]
-    out = np.empty((len(cells), corners * (corners - 1) // 2))
-    square_sides(place, np.ascontiguousarray(cells), out)
-    return out
 
 
 def shares(count: int) -> list[tuple[int, int]]:

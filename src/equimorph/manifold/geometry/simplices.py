@@ -1,8 +1,11 @@
 """Geometry of simplices in the space of the free parameters, in one to three dimensions."""
 
+from math import factorial
+
 import numpy as np
 
 from equimorph.arrays import Cells, Float, ItemValues, Place, Places
+from equimorph.manifold.geometry.kernels import square_sides
 
 
 def volumes(corners: Float[np.ndarray, "n corners d"]) -> ItemValues:
@@ -28,13 +31,36 @@ def middles(
     return np.asarray(total / cells.shape[1])
 
 
+def squared_sides(
+    places: Float[np.ndarray, "V embedding"], cells: Cells
+) -> Float[np.ndarray, "C sides"]:
+    """Squared lengths of the sides 01, 02, 12 and so on of cells."""
+    corners = cells.shape[1]
+    out = np.empty((len(cells), corners * (corners - 1) // 2))
+    square_sides(places, np.ascontiguousarray(cells, int), out)
+    return out
+
+
 def longest_sides(
     places: Float[np.ndarray, "V embedding"], cells: Cells
 ) -> Float[np.ndarray, " C"]:
     """Longest side of each cell from its first corner."""
-    first, *rest = cells.T
-    sides = [np.linalg.norm(places[corner] - places[first], axis=1) for corner in rest]
-    return np.asarray(np.max(sides, axis=0))
+    first, *rest = squared_sides(places, cells).T[: cells.shape[1] - 1]
+    for side in rest:
+        first = np.maximum(first, side)
+    return np.asarray(np.sqrt(first))
+
+
+def sizes_of(places: Float[np.ndarray, "V embedding"], cells: Cells) -> Float[np.ndarray, " C"]:
+    """Lengths, areas or volumes of cells."""
+    squared, d = squared_sides(places, cells), cells.shape[1] - 1
+    gram, number = np.empty((len(cells), d, d)), d
+    for i in range(d):
+        gram[:, i, i] = squared[:, i]
+        for j in range(i + 1, d):
+            inner = 0.5 * (squared[:, i] + squared[:, j] - squared[:, number])
+            gram[:, i, j], gram[:, j, i], number = inner, inner, number + 1
+    return np.asarray(np.sqrt(np.maximum(np.linalg.det(gram), 0.0)) / factorial(d))
 
 
 def barycentric(

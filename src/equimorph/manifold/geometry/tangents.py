@@ -25,8 +25,8 @@ from equimorph.equilibria.critical import Critical, null_border
 from equimorph.equilibria.newton_step import free_directions, weights_of
 from equimorph.equilibria.point_conditions import second_derivatives
 from equimorph.linalg import orthonormal_rows
-from equimorph.manifold.geometry.kernels import square_sides
 from equimorph.manifold.geometry.setting import Setting, embed
+from equimorph.manifold.geometry.simplices import squared_sides
 from equimorph.model import worst_excess
 from equimorph.tolerances import METRIC_DIFFERENCE
 
@@ -218,8 +218,7 @@ def _breadths(
     """How far the sides from each corner are from dependent: the determinant of their cosines."""
     corners = cells.shape[1]
     pairs = list(combinations(range(corners), 2))
-    squared = np.empty((len(cells), len(pairs)))
-    square_sides(place, np.ascontiguousarray(cells), squared)
+    squared = squared_sides(place, cells)
     length = np.zeros((len(cells), corners, corners))
     for (i, j), own in zip(pairs, squared.T, strict=True):
         length[:, i, j] = length[:, j, i] = own

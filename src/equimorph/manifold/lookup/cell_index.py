@@ -79,12 +79,14 @@ class CellIndex:
         width = flat.max(axis=0) - lower if len(flat) else np.ones(d)
         width = np.where(width > 0.0, width, 1.0)
         unit = (corners - lower) / width
-        low, high = unit.min(axis=1), unit.max(axis=1)
+        low = high = unit[:, 0]
+        for k in range(1, d + 1):  # rows of few numbers are slow to reduce
+            low, high = np.minimum(low, unit[:, k]), np.maximum(high, unit[:, k])
         extent = high - low
-        counts = _bins(extent)
         overhang = np.ascontiguousarray(np.broadcast_to(overhang.T, (d + 1, len(corners))).T)
         # a corner moves with the facets opposite to the other corners
         room = np.sort(overhang, axis=1)[:, 1:].sum(axis=1, keepdims=True) * extent
+        counts = _bins(extent + 2.0 * room)
         first, last = (
             np.clip((side * counts).astype(int), 0, counts - 1)
             for side in (low - room, high + room)
@@ -105,7 +107,7 @@ class CellIndex:
 
 
 def _bins(extent: Float[np.ndarray, "C d"]) -> Int[np.ndarray, " d"]:
-    """Number of bins along each parameter: half the size of a typical cell, but not too many."""
+    """Number of bins along each parameter: halves of what typical cells reach, but not too many."""
     typical = np.median(extent, axis=0) if len(extent) else np.ones(extent.shape[1])
     counts = np.clip(np.round(2.0 / np.maximum(typical, 1e-6)), 1, None)
     share = MOST_BINS * max(len(extent), 1) / counts.prod()
@@ -120,10 +122,13 @@ def _maps(unit: Float[np.ndarray, "C corners d"]) -> Float[np.ndarray, "C corner
     flat = np.abs(volumes(unit)) < FLAT
     homogeneous[flat] = np.eye(homogeneous.shape[1])
     if unit.shape[1] == TRIANGLE:  # the products of two corners are all minors
-        first, second, third = np.swapaxes(homogeneous, 0, 1)
-        pairs = (second, third), (third, first), (first, second)
-        maps = np.stack([np.cross(*pair) for pair in pairs], axis=1)
-        maps /= np.einsum("ci,ci->c", first, maps[:, 0])[:, None, None]
+        x, y, ones = homogeneous.T
+        maps = np.empty(homogeneous.shape)
+        for k, (i, j) in enumerate(((1, 2), (2, 0), (0, 1))):
+            maps[:, k, 0] = y[i] * ones[j] - ones[i] * y[j]
+            maps[:, k, 1] = ones[i] * x[j] - x[i] * ones[j]
+            maps[:, k, 2] = x[i] * y[j] - y[i] * x[j]
+        maps /= np.einsum("ci,ci->c", homogeneous[:, 0], maps[:, 0])[:, None, None]
     else:
         maps = np.linalg.inv(np.swapaxes(homogeneous, 1, 2))
     maps[flat] = np.nan

@@ -29,6 +29,7 @@ from equimorph.manifold.complex.kept_tables import kept, places_of
 from equimorph.manifold.complex.marked_complex import Fabric
 from equimorph.manifold.complex.vertices import Vertices
 from equimorph.manifold.geometry.setting import Setting
+from equimorph.manifold.geometry.simplices import sizes_of
 from equimorph.manifold.geometry.tangents import split_step
 from equimorph.manifold.geometry.topology import adjacency, count_corners, pieces
 from equimorph.model import Constraint, Descriptor
@@ -176,11 +177,7 @@ def restricted(eset: EquilibriumSet, constraint: Constraint) -> EquilibriumSet:
 
 def cell_sizes(eset: EquilibriumSet) -> Float[np.ndarray, " C"]:
     """Lengths, areas or volumes of the cells in the metric of the embedding."""
-    corners = places_of(eset)[eset.cells]
-    sides = corners[:, 1:] - corners[:, :1]
-    gram = sides @ np.swapaxes(sides, 1, 2)
-    share = {1: 1.0, 2: 0.5, 3: 1.0 / 6.0}[len(eset.names)]
-    return np.asarray(share * np.sqrt(np.maximum(np.linalg.det(gram), 0.0)))
+    return sizes_of(places_of(eset), eset.cells)
 
 
 @check_arguments

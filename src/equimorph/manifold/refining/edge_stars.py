@@ -25,8 +25,9 @@ from equimorph.arrays import (
     VertexFlags,
 )
 from equimorph.columns import Columns
-from equimorph.manifold.complex.marked_complex import CURVES, Fabric, FacetMark, squared_sides
+from equimorph.manifold.complex.marked_complex import CURVES, Fabric, FacetMark
 from equimorph.manifold.complex.vertices import Vertices
+from equimorph.manifold.geometry.simplices import squared_sides
 from equimorph.manifold.geometry.topology import among, count_corners, distinct, keys_of, rows_of
 from equimorph.manifold.refining.quality import POOR, determinants, smallest_angles
 from equimorph.manifold.refining.stars import Kind, Refills, Rows

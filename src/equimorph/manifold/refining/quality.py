@@ -21,9 +21,9 @@ from equimorph.manifold.complex.marked_complex import (
     Fabric,
     FacetMark,
     edges_of,
-    squared_sides,
 )
 from equimorph.manifold.complex.vertices import Vertices
+from equimorph.manifold.geometry.simplices import squared_sides
 from equimorph.manifold.geometry.topology import count_corners, labels
 
 SHARP = np.radians(10.0)

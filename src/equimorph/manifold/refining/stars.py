@@ -7,7 +7,8 @@ from itertools import combinations
 import numpy as np
 
 from equimorph.arrays import Bool, Cells, Edges, Float, Int, ItemFlags, Items
-from equimorph.manifold.complex.marked_complex import TRIANGLES, Fabric, squared_sides
+from equimorph.manifold.complex.marked_complex import TRIANGLES, Fabric
+from equimorph.manifold.geometry.simplices import squared_sides
 from equimorph.manifold.geometry.topology import among, count_corners, distinct, keys_of, runs
 from equimorph.manifold.refining.quality import POOR, qualities, smallest_angles, worst
 

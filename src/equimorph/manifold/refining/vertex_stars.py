@@ -18,11 +18,11 @@ from equimorph.manifold.complex.marked_complex import (
     FacetMark,
     edges_of,
     held_parameters,
-    squared_sides,
 )
 from equimorph.manifold.complex.shared_edges import copies
 from equimorph.manifold.complex.vertices import Vertices
 from equimorph.manifold.geometry.setting import embed
+from equimorph.manifold.geometry.simplices import squared_sides
 from equimorph.manifold.geometry.tangents import split_step
 from equimorph.manifold.geometry.topology import count_corners, distinct, keys_of, rows_of
 from equimorph.manifold.refining.quality import POOR, SHARP, determinants, smallest_angles, worst

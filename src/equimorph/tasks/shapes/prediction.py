@@ -83,7 +83,9 @@ class Predictor:
 
     @cached_property
     def _middles(self) -> cKDTree:
-        """The middles of the cells in the metric."""
+        """The middles of the cells in the metric; those of the chart, if there is one."""
+        if self.chart is not None:
+            return self.chart.cells.tree
         return cKDTree(middles(places_of(self.eset), self.eset.cells))
 
     def holds(self, states: States) -> Flags:
