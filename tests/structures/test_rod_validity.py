@@ -79,6 +79,30 @@ def test_the_clearance_of_a_straight_rod_is_the_least_distance_along_it():
     assert rod.clearance(0.125)(rod.natural_state()) == pytest.approx(0.125, rel=1e-12)
 
 
+@pytest.mark.parametrize("apart", [0.1, 0.3, 0.7])
+def test_the_clearance_of_an_arc_is_the_chord_of_the_least_difference(apart):
+    """2 R sin(s/2R) at any s, also no multiple of the spacing h of samples; error κ³ h⁴."""
+    for length in (1.0, 40.0):
+        ends = ("clamped", "free")
+        rod = em.Rod(ends=ends, curvature=3.0 / length, EI=1.0, length=length, loads={})
+        chord = 2.0 / 3.0 * length * np.sin(1.5 * apart)
+        assert rod.clearance(apart)(rod.natural_state()) == pytest.approx(chord, rel=2e-7)
+
+
+def test_clearances_are_those_of_dense_samples():
+    """Ends that come near the rod, and stretched rods; 1e-5: samples 1/2000 apart."""
+    s, rng = np.linspace(0.0, 1.0, 2001), np.random.default_rng(0)
+    for k in range(8):
+        bend = rng.uniform(3.0, 9.0) * rng.uniform(0.5, 1.5, 2)
+        table = [[0.0, bend[0]], [1.0, bend[1]]]
+        rod = em.Rod(ends=("clamped", "free"), curvature=table, axial=[None, 5.0][k % 2])
+        state = em.lift(rod.natural_state(), {"q": 0.05}).end.state
+        places = rod.shape(state.z[None], state.p[None], s)[0]
+        far = s - s[:, None] >= 0.25 - 1e-12
+        exact = np.linalg.norm(places[:, None] - places, axis=2)[far].min()
+        assert rod.clearance(0.25)(state) == pytest.approx(exact, abs=1e-5)
+
+
 def test_wrong_input_gets_one_line():
     rod = em.Rod()
     with pytest.raises(em.InputError, match="`apart` must be a share of the rod's length"):

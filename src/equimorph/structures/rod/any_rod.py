@@ -25,7 +25,7 @@ from equimorph.structures.equations import (
     Shift,
 )
 from equimorph.structures.resolution import Refinable
-from equimorph.structures.rod.centreline import Centreline, closest_approach, stations
+from equimorph.structures.rod.centreline import Centreline, closest_approach, stations, stretches
 from equimorph.structures.rod.discretisation import Mesh
 from equimorph.structures.rod.inertia import HeavyRod
 from equimorph.structures.rod.mechanics import RodMechanics
@@ -371,7 +371,8 @@ class AnyRod(HeavyRod, Refinable):
             )
 
         def found(z: Lanes, p: Parameters) -> tuple[Values, Values]:
-            return closest_approach(self.centreline(z, p, stations()), apart)
+            line, short = self.centreline(z, p, stations()), self.shortenings(z, p)
+            return closest_approach(line, stretches(short, self.mesh), apart)
 
         def value(z: Lanes, p: Parameters) -> Values:
             return found(z, p)[0]
