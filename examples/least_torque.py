@@ -47,13 +47,15 @@ def main(intervals: tuple[int, int] = (25, 25)) -> Result:
 
 def figure(result: Result) -> Axes:
     """The torque along the route, with the least one that any route needs."""
-    least = result.torque <= result.route.bottleneck.value
-    return em.plotting.margins(result.route, within=[least])
+    lowest = result.route.bottleneck
+    assert lowest is not None, result.route.why
+    return em.plotting.margins(result.route, within=[result.torque <= lowest.value])
 
 
 if __name__ == "__main__":
     found = main()
     lowest = found.route.bottleneck
+    assert lowest is not None, found.route.why
     place = ", ".join(f"{name} = {lowest.state[name]:.7f}" for name in found.eset.names)
     print(found.eset.audit)
     print(f"least torque {lowest.value:.6f} N mm at {place} ({lowest.kind})")
