@@ -1,12 +1,14 @@
 """Sets over three parameters: balls and spheres known by name, the spring, and a coarse arch."""
 
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
 
 from equimorph.manifold import (
     EquilibriumSet,
+    VertexKind,
     build,
     equilibrium_set,
     level_set,
@@ -14,9 +16,9 @@ from equimorph.manifold import (
     stability_distance,
 )
 from equimorph.manifold.complex.excerpts import fabric_of
-from equimorph.manifold.geometry.exact_points import Aim, correct_points
+from equimorph.manifold.geometry.exact_points import Aim, Pinned, correct_points, middles, pin
 from equimorph.manifold.geometry.setting import embed
-from equimorph.manifold.geometry.simplices import squared_sides, volumes
+from equimorph.manifold.geometry.simplices import shares_in, squared_sides, volumes
 from equimorph.manifold.geometry.topology import (
     adjacency,
     euler_characteristic,
@@ -24,7 +26,7 @@ from equimorph.manifold.geometry.topology import (
     labels,
     orientation,
 )
-from equimorph.manifold.lifting import cells
+from equimorph.manifold.lifting import balls, cells
 from equimorph.manifold.lifting.cells import volumes_over
 from equimorph.manifold.refining.quality import qualities, smallest_angles
 from equimorph.model import Box, Descriptor
@@ -140,6 +142,40 @@ def test_curve_of_cusps_is_no_edge_of_the_fold_surface():
     a, b, c = eset.coordinates[folded].T
     np.testing.assert_allclose(a + 0.5 * c**2, -3 * x[folded] ** 2, rtol=0, atol=1e-9)
     np.testing.assert_allclose(b, 2 * x[folded] ** 3, rtol=0, atol=1e-9)
+
+
+def pinned_one_by_one(setting, points, groups, kind, span, frames):
+    """Points of `pin_in_cells`, each try for itself, in order."""
+    z, p, _ = middles(setting, points, groups)
+    found = np.zeros(len(groups), bool)
+    for lane, group in enumerate(groups):
+        best = -np.inf if kind == VertexKind.FOLD else balls.ON_FACE
+        members = range(min(len(group), balls.TRIED))
+        for share, member in [(0.0, 0), *product(balls.SHARES, members)]:
+            tried = pin(setting, points, [group], kind, span[[lane]], np.array([member]), share)
+            depth = shares_in(frames[[lane]], tried.p[:, setting.free]).min()
+            if tried.found[0] and depth > best:
+                z[lane], p[lane], best, found[lane] = tried.z[0], tried.p[0], depth, True
+            if best > balls.ON_FACE:
+                break
+    return Pinned(z, p, found)
+
+
+def test_points_that_are_tried_together_are_those_of_one_try_after_the_other(monkeypatch):
+    """Around a curve of cusps, where folds bulge beyond their cells, and some are lost."""
+    asked, compute = [], balls.pin_in_cells
+
+    def both(*given):
+        asked.append((compute(*given), pinned_one_by_one(*given)))
+        return asked[-1][0]
+
+    monkeypatch.setattr(balls, "pin_in_cells", both)
+    lifted(ridge(), BOX, (3, 3, 3))
+    assert sum(len(each.found) for each, _ in asked) > 20
+    for together, alone in asked:
+        np.testing.assert_array_equal(together.found, alone.found)
+        np.testing.assert_allclose(together.z, alone.z, rtol=0.0, atol=1e-12)
+        np.testing.assert_allclose(together.p, alone.p, rtol=0.0, atol=1e-12)
 
 
 @pytest.mark.parametrize(

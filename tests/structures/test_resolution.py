@@ -6,10 +6,11 @@ import pytest
 from equimorph import Box, Frame, Rod, SpatialRod, equilibrium_set
 from equimorph.structures.resolution import TAIL, turn_of_element
 from equimorph.structures.rod.discretisation import reference_element
+from equimorph.structures.spatial.lagrangian import LARGEST_TAIL
 from oracles.specimens import toggle
 
 
-@pytest.mark.parametrize("wave", [0.4, 0.8])
+@pytest.mark.parametrize("wave", [0.4, 0.5, 0.8])
 @pytest.mark.parametrize("degree", [4, 6, 8, 9, 12])
 def test_waves_as_curved_as_the_bound_are_resolved_by_an_element_and_not_by_a_longer_one(
     degree, wave
@@ -33,7 +34,19 @@ def test_structures_keep_all_but_their_elements():
     assert fine.resolution == (14, 8)
     assert [each.default for each in fine.parameters] == [each.default for each in rod.parameters]
     assert rod.resolving(1.0).resolution == rod.resolution == (6, 8)
-    assert SpatialRod(torsion=0.77, lateral=1.4).resolving(20.0).resolution == (13, 6)
+    assert SpatialRod(torsion=0.77, lateral=1.4).resolving(20.0).resolution == (18, 6)
+
+
+def test_helices_whose_span_is_85_percent_of_their_length_are_resolved_in_space():
+    """R = Rx(φ) Rz(A) Rx(−φ) has tangents at A from the axis x, and κ = φ' sin A."""
+    wave, bound = 0.55, 20.0
+    rod = SpatialRod(torsion=0.77, lateral=1.4).resolving(bound)
+    mesh = rod.mechanics.mesh
+    for start in np.linspace(0.0, np.pi, 9):
+        phase = start + bound / np.sin(wave) * mesh.nodes
+        aside = np.sin(0.5 * wave) * np.stack([np.sin(phase), np.cos(phase)])
+        q = np.stack([np.full_like(phase, np.cos(0.5 * wave)), 0.0 * phase, *aside], axis=1)
+        assert np.abs(np.einsum("cn,na->ca", mesh.highest, q)).max() < LARGEST_TAIL
 
 
 def test_lengths_count_in_the_units_of_the_bound():

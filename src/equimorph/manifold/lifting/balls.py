@@ -8,7 +8,6 @@ fold surface.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import product
 
 import numpy as np
 
@@ -64,22 +63,29 @@ def pin_in_cells(
     frames
         Corners of the grid cells, in free parameters.
     """
-    sizes = np.array([len(group) for group in groups])
+    sizes = np.array([len(group) for group in groups], int)
     z, p, _ = middles(setting, points, groups)
     best = np.full(len(groups), -np.inf if kind == VertexKind.FOLD else ON_FACE)
     found = np.zeros(len(groups), bool)
-    towards = product(SHARES, range(min(TRIED, int(sizes.max(initial=0)))))
-    for share, member in ((0.0, 0), *towards):
-        lanes = np.flatnonzero((~found | (best <= ON_FACE)) & (sizes > member))
-        if len(lanes) == 0:
-            continue
-        own = [groups[lane] for lane in lanes.tolist()]
-        pinned = pin(setting, points, own, kind, span[lanes], member, share)
-        inside = shares_in(frames[lanes], pinned.p[:, setting.free]).min(axis=1)
+    for share in (0.0, *SHARES):
+        left = np.flatnonzero(best <= ON_FACE)
+        if len(left) == 0:
+            break
+        few = np.minimum(sizes[left], TRIED if share else 1)
+        row, member = np.nonzero(np.arange(TRIED) < few[:, None])
+        lane = left[row]
+        # towards all members at once: each call takes long, be it for few lanes
+        own = [groups[each] for each in lane.tolist()]
+        pinned = pin(setting, points, own, kind, span[lane], member, share)
+        inside = shares_in(frames[lane], pinned.p[:, setting.free]).min(axis=1)
         depth = np.where(pinned.found, inside, -np.inf)
-        better = depth > best[lanes]
-        at = lanes[better]
-        z[at], p[at], best[at], found[at] = pinned.z[better], pinned.p[better], depth[better], True
+        for number in range(int(few.max())):
+            tried = np.flatnonzero(member == number)
+            at = lane[tried]
+            better = (best[at] <= ON_FACE) & (depth[tried] > best[at])
+            at, tried = at[better], tried[better]
+            z[at], p[at], best[at] = pinned.z[tried], pinned.p[tried], depth[tried]
+            found[at] = True
     return Pinned(z, p, found)
 
 
