@@ -134,14 +134,15 @@ class Coordinates(Scalars):
         return bool((self.places >= 0).all())
 
     def derivative(self, z: Lanes, p: Parameters, frames: Frames) -> Square:
-        """Derivatives of the coordinates (rows) along tangents (columns)."""
-        columns = []
-        for k in range(frames.shape[1]):
-            dz, dp = split_step(self.setting, METRIC_DIFFERENCE * frames[:, k])
-            columns.append(
-                (self(z + dz, p + dp) - self(z - dz, p - dp)) / (2.0 * METRIC_DIFFERENCE)
-            )
-        return np.stack(columns, axis=2)
+        """Derivatives of the coordinates (rows) along tangents (columns): all from one call."""
+        d = frames.shape[1]
+        steps = [split_step(self.setting, METRIC_DIFFERENCE * frames[:, k]) for k in range(d)]
+        z, p = (
+            np.concatenate([here + side * step[k] for step in steps for side in (1.0, -1.0)])
+            for k, here in enumerate((z, p))
+        )
+        ahead, behind = np.moveaxis(self(z, p).reshape(d, 2, len(frames), d), (1, 0), (0, 3))
+        return np.asarray((ahead - behind) / (2.0 * METRIC_DIFFERENCE))
 
     def solve_states(
         self, z: Lanes, p: Parameters, wanted: Values, planes: Callable[[Some], Rows], folded: Flags
@@ -173,6 +174,8 @@ class Coordinates(Scalars):
             column[quick.found] for column in (quick.z, quick.p, quick.index, quick.found)
         )
         rest = np.flatnonzero(~good)
+        if len(rest) == 0:
+            return z, p, good, index
         slow = solve_on_the_set(self, z[rest], p[rest], wanted[rest], planes(rest))
         z[rest], p[rest], good[rest] = slow.z, slow.p, slow.found
         index[rest] = np.where(slow.found, slow.index, -1)

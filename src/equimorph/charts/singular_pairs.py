@@ -135,6 +135,8 @@ class SingularPairs:
         """States found over points, and those of pairs beside the singular states."""
         setting, structure = self.coordinates.setting, self.states.structure
         point, near, step = self._predict(points)
+        if len(point) == 0:
+            return found
         tangent = np.einsum("nd,ndf->nf", step, self._frames[near])
         dz, dp = split_step(setting, tangent)
         start = self.states[near]

@@ -27,6 +27,8 @@ def add_twins(cells: Cells, found: Found, points: Points) -> Found:
     place = np.searchsorted(cells.numbers, found.cell)
     rows = cells.planes(place)
     z, p, of = _guesses(cells.coordinates, found.states.z, found.states.p, rows, cells.ranges)
+    if len(of) == 0:
+        return found
     own = solve_on_the_set(cells.coordinates, z, p, points[found.point[of]], rows[of])
     some = np.flatnonzero(own.found)
     states, of = States(cells.eset.structure, own.z[some], own.p[some]), of[some]
@@ -56,8 +58,9 @@ def _guesses(
         np.concatenate([each - STEP * d, each + STEP * d]) for each, d in ((z, dz), (p, dp))
     )
     there = settle_on_set(setting, beside_z, beside_p, np.concatenate([rows, rows]))
-    below, above = np.split(coordinates(there.z, there.p) / ranges, 2)
-    second = (below - 2.0 * coordinates(z, p) / ranges + above) / STEP**2
+    every = np.concatenate([there.z, z]), np.concatenate([there.p, p])
+    below, above, here = np.split(coordinates(*every) / ranges, 3)
+    second = (below - 2.0 * here + above) / STEP**2
     bend = np.einsum("lm,lm->l", left[:, :, -1], second)
     with np.errstate(divide="ignore", invalid="ignore"):
         t = -2.0 * sizes[:, -1] / bend

@@ -9,6 +9,7 @@ from scipy.spatial import cKDTree
 
 from equimorph.arrays import Bool, Edges, Flags, Float, Int, Items
 from equimorph.charts import DescriptorChart
+from equimorph.charts.location import Found
 from equimorph.equilibria.point_conditions import Values
 from equimorph.equilibria.settle import Guards, Settled, embedded_planes, free_directions, settle
 from equimorph.errors import InputError
@@ -109,14 +110,17 @@ class Predictor:
         """Vertices with the least misfits."""
         return np.asarray(self._tree.query(targets / self.spread)[1], int)
 
-    def cells(self, targets: Float[np.ndarray, "many k"]) -> tuple[Shares, Items, Items]:
+    def cells(
+        self, targets: Float[np.ndarray, "many k"], known: Found | None = None
+    ) -> tuple[Shares, Items, Items]:
         """Barycentric coordinates at which cells take values, in or near them; cells, targets.
 
-        Those of each target one after the other, the most central first.
+        Those of each target one after the other, the most central first; none close to states that
+        are known already.
         """
         hits = self._index.near(targets / self.spread)
         hits = hits.take(np.lexsort((-hits.weights.min(axis=1), hits.point)))
-        chosen = self._different(hits)
+        chosen = self._different(hits, known)
         return hits.weights[chosen], hits.cell[chosen], hits.point[chosen]
 
     @cached_property
@@ -138,25 +142,36 @@ class Predictor:
         )
         return np.asarray(2 * eset.cell_index + (next(moves) * next(moves) > 0), int)
 
-    def _different(self, hits: Hits) -> Items:
-        """Predictions that are not close to an earlier one from the same side of folds."""
+    def _different(self, hits: Hits, known: Found | None) -> Items:
+        """Predictions that are not close to an earlier one from the same side of folds.
+
+        Nor to a known state from this side.
+        """
         corners, structure = self.eset.cells[hits.cell], self.setting.structure
         n, free = structure.unknowns, self.setting.free
         u = np.einsum("ck,cki->ci", hits.weights, self.eset.points.z[corners, :n])
         p = np.einsum("ck,cki->ci", hits.weights, self.eset.points.p[corners][:, :, free])
         place = np.concatenate([u * np.sqrt(structure.mass), p / self.setting.scales], axis=1)
         reach, side = CLOSE * self._sizes[hits.cell], self._sides[hits.cell]
-        bounds = np.searchsorted(hits.point, np.arange(hits.point.max(initial=-1) + 2))
+        rows = np.arange(hits.point.max(initial=-1) + 2)
+        before, there, beside = np.zeros(len(rows), int), place[:0], side[:0]
+        if known is not None:
+            before = np.searchsorted(known.point, rows)
+            there = embed(self.setting, known.states.z, known.states.p)
+            beside = self._sides[known.cell]
         kept: list[int] = []
-        for first, last in pairwise(bounds.tolist()):
-            own = place[first:last]
-            gap = np.linalg.norm(own[:, None] - own, axis=2)
-            close = (gap < reach[first:last]) & (side[first:last, None] == side[first:last])
-            chosen: list[int] = []
+        bounds = pairwise(np.searchsorted(hits.point, rows).tolist())
+        for (first, last), held in zip(bounds, pairwise(before.tolist()), strict=True):
+            own, these = slice(first, last), slice(*held)
+            every = np.concatenate([there[these], place[own]])
+            gap = np.linalg.norm(place[own, None] - every, axis=2)
+            close = gap < reach[own, None]
+            close &= side[own, None] == np.concatenate([beside[these], side[own]])
+            chosen = list(range(count := held[1] - held[0]))
             for k in range(last - first):
                 if not close[k, chosen].any():
-                    chosen.append(k)
-            kept += [first + k for k in chosen]
+                    chosen.append(count + k)
+            kept += [first + k - count for k in chosen[count:]]
         return np.array(kept, int)
 
     def guesses(self, share: Shares, cells: Items) -> SetPoints:

@@ -10,6 +10,7 @@ import numpy as np
 
 from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Float, Int, Values
+from equimorph.charts.location import Found
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet, Level
 from equimorph.manifold.complex.equilibrium_set import check_cells
@@ -298,12 +299,13 @@ def _solve(
     known: Predictor, targets: Float[np.ndarray, "many k"], within: tuple[Constraint, ...]
 ) -> list[tuple[States, Values]]:
     """Exact solutions of each question in the box and within constraints, each once."""
-    structure, eset = known.eset.structure, known.eset
-    guesses, owner = _guesses(known, targets)
-    exact = states_with_values(known.setting, guesses, known.descriptors, targets[owner])
-    z, p, found = exact.z, exact.p, exact.found
+    structure, eset, charted = known.eset.structure, known.eset, None
     if targets.shape[1] == len(eset.names) and known.chart is not None:
         charted = known.chart.find(targets)
+    guesses, owner = _guesses(known, targets, charted)
+    exact = states_with_values(known.setting, guesses, known.descriptors, targets[owner])
+    z, p, found = exact.z, exact.p, exact.found
+    if charted is not None:
         owner = np.concatenate([owner, charted.point])
         order = np.argsort(owner, kind="stable")
         z = np.concatenate([z, charted.states.z])[order]
@@ -340,16 +342,19 @@ def _members(
 
 
 def _guesses(
-    known: Predictor, targets: Float[np.ndarray, "many k"]
+    known: Predictor, targets: Float[np.ndarray, "many k"], charted: Found | None
 ) -> tuple[SetPoints, Int[np.ndarray, " lanes"]]:
-    """Starts of Newton's method, and the questions that they belong to."""
+    """Starts of Newton's method, and the questions that they belong to.
+
+    None close to what the chart found.
+    """
     if targets.shape[1] < len(known.eset.names):
         starts = [local_minima(known.edges, known.misfits(each))[:STARTS] for each in targets]
         vertices = np.concatenate(starts)
         owner = np.repeat(np.arange(len(targets)), [len(each) for each in starts])
         used, place = np.unique(vertices, return_inverse=True)
         return points_at_vertices(known.eset, used).take(place), owner
-    shares, cells, owner = known.cells(targets)
+    shares, cells, owner = known.cells(targets, charted)
     return known.guesses(shares, cells), owner
 
 
