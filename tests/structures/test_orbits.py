@@ -383,3 +383,20 @@ def test_searches_find_each_orbit_twice(pinned):
     energies = np.sort([state.energy for state in found.stable])
     assert len(energies) >= 2
     np.testing.assert_allclose(energies[::2], energies[1::2], atol=1e-10)
+
+
+def test_only_what_keeps_an_orbit_has_derivatives():
+    """By neighbours that are lifted: the distance from the axis, which does not turn."""
+    loads = {"w": em.PointForce(0.5, (0.0, 0.0, 1.0)), "x": em.PointForce(0.6, (1.0, 0.0, 0.0))}
+    rod = em.SpatialRod(torsion=0.75, lateral=1.0, loads=loads, span=0.9)
+    way = [{"twist_B": 3.0}, {"Theta": 0.0}]
+    state = em.lift(rod.natural_state(Theta=0.2), way).end.state
+    away = em.function_of("away", np.hypot, rod.height(0.5), rod.coordinate(2, 0.5))
+    found = em.sensitivity(state, [away], ["x", "nu", "twist_B"])
+    for name in found.names:
+        ends = [em.lift(state, {name: state[name] + h}).end.state for h in (1e-5, -1e-5)]
+        exact = (away(ends[0]) - away(ends[1])) / 2e-5
+        assert found["away", name] == pytest.approx(exact, rel=1e-5)
+    for name in ("w", "Theta", "sideways"):
+        with pytest.raises(InputError, match=f"keep the orbit of the state; got {name}"):
+            em.sensitivity(state, [away], ["nu", name])

@@ -14,7 +14,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
-from equimorph.arrays import Flags, Float, Int, Lanes, Parameters, Values, Velocity
+from equimorph.arrays import Flags, Float, Int, Lanes, Parameters, Values
 from equimorph.errors import InputError, suggestion
 from equimorph.model import (
     Call,
@@ -192,10 +192,10 @@ class Structure(Rebuilt, Inertial):
         """
         return np.zeros(len(p), bool)
 
-    def along_orbits(self, z: Lanes, p: Parameters) -> Velocity:
-        """Rates of the unknowns at which a continuous symmetry moves states; 0 where none does."""
+    def along_orbits(self, z: Lanes, p: Parameters) -> Lanes:
+        """Rates of z at which a continuous symmetry moves states; 0 where none does."""
         del p
-        return np.zeros((len(z), self.unknowns))
+        return np.zeros_like(z)
 
     def pick_on_orbits(self, z: Lanes, p: Parameters, towards: Parameters) -> Lanes:
         """States from which paths to other parameters begin; by default the given ones.

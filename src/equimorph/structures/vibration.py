@@ -119,7 +119,7 @@ class _Moving:
 
         count = n + len(springs.stiffness)
         along = np.zeros((len(z), 1, count))
-        along[:, 0, :n] = structure.along_orbits(z, p)
+        along[:, 0, :n] = structure.along_orbits(z, p)[:, :n]
         heavy = inertia(along)
         weight = heavy @ along.transpose(0, 2, 1)
         share = np.divide(along, weight, out=np.zeros_like(along), where=weight > 0.0)

@@ -4,7 +4,7 @@ from functools import cache, cached_property, partial
 
 import numpy as np
 
-from equimorph.arrays import Entries, Float, Int, Lanes, Parameters, Sides, Values, Velocity
+from equimorph.arrays import Entries, Float, Int, Lanes, Parameters, Sides, Values
 from equimorph.linalg import Border, BorderedSolution
 from equimorph.linalg.condensed import PIVOT_GUARD
 from equimorph.linalg.dense import no_border
@@ -195,10 +195,10 @@ class SpatialMechanics(SpatialLagrangian, JointEquations):
         both = self.equations(z, p, (np.zeros_like(z), dp))
         return np.ascontiguousarray(both[0]), np.ascontiguousarray(both[1])
 
-    def along_orbits(self, z: Lanes, p: Parameters) -> Velocity:
-        """Rates of the unknowns at which states turn about an axis for nothing: 0."""
+    def along_orbits(self, z: Lanes, p: Parameters) -> Lanes:
+        """Rates of z at which states turn about an axis for nothing: 0."""
         del p
-        return np.zeros((len(z), self.unknowns))
+        return np.zeros_like(z)
 
     # --- solves ---------------------------------------------------------------------------------
 

@@ -16,7 +16,7 @@ from functools import cached_property, partial
 
 import numpy as np
 
-from equimorph.arrays import Flags, Float, Lanes, Parameters, Sides, Values, Velocity
+from equimorph.arrays import Flags, Float, Lanes, Parameters, Sides, Values
 from equimorph.linalg import BorderedSolution
 from equimorph.linalg.dense import multiply, no_border
 from equimorph.structures.equations import Advance, AnyBorder, Direction, Shift
@@ -168,10 +168,10 @@ class PinnedMechanics(SpatialMechanics):
         around[:, n:] = z[:, n:] @ (np.outer(held[0], held[1]) - np.outer(held[1], held[0]))
         return around
 
-    def along_orbits(self, z: Lanes, p: Parameters) -> Velocity:
-        """ξ of the unknowns; 0 on the axis."""
+    def along_orbits(self, z: Lanes, p: Parameters) -> Lanes:
+        """ξ; 0 on the axis."""
         del p
-        return np.where(self.on_axis(z)[:, None], 0.0, self.velocity(z)[:, : self.unknowns])
+        return np.where(self.on_axis(z)[:, None], 0.0, self.velocity(z))
 
     def resolved(self, z: Lanes, p: Parameters) -> Flags:
         """Whether the rotations are smooth, and the phase condition exerts no force."""
@@ -243,9 +243,9 @@ class OrbitMechanics(SpatialMechanics):
             symmetric[symmetric] = ~self.pinned.on_axis(self._widen(z[symmetric]))
         return symmetric
 
-    def along_orbits(self, z: Lanes, p: Parameters) -> Velocity:
-        """ξ of the unknowns of states that may be turned, 0 of others."""
-        around = self.pinned.velocity(self._widen(z))[:, : self.unknowns]
+    def along_orbits(self, z: Lanes, p: Parameters) -> Lanes:
+        """ξ of states that may be turned, 0 of others."""
+        around = self.pinned.velocity(self._widen(z))[:, :-1]
         return np.where(self.on_orbits(z, p)[:, None], around, 0.0)
 
     def pick_on_orbits(self, z: Lanes, p: Parameters, towards: Parameters) -> Lanes:

@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
-from equimorph.arrays import Flags, Float, Lanes, Parameters, Values, Velocity
+from equimorph.arrays import Flags, Float, Lanes, Parameters, Values
 from equimorph.errors import InputError
 from equimorph.model import Drawing, parameter_vector
 from equimorph.structures.discrete import correct_at_parameters
@@ -298,7 +298,7 @@ class SpatialRod(DescribedInSpace):
         rod = self.mechanics
         return rod.have_orbits(p) if isinstance(rod, OrbitMechanics) else np.zeros(len(p), bool)
 
-    def along_orbits(self, z: Lanes, p: Parameters) -> Velocity:
+    def along_orbits(self, z: Lanes, p: Parameters) -> Lanes:
         """Rates at which states off the x axis turn about it, where they may for nothing."""
         return self.mechanics.along_orbits(z, p)
 

@@ -19,7 +19,6 @@ CRITICAL = 1e-5
 """Size of the smallest singular value, relative to the next, up to which a state is critical."""
 FLAT = 1e-6
 """φᵀF_q relative to its factors, below which the path in q does not turn: a branch point."""
-
 Vector = Float[np.ndarray, " k"]
 
 
@@ -73,7 +72,8 @@ def sensitivity(
     Raises
     ------
     InputError
-        If the state is no equilibrium or a critical one, or for an unknown name.
+        If the state is no equilibrium or a critical one, a parameter takes away its orbit, or
+        for an unknown name.
     """
     check_start(state)
     structure = state.structure
@@ -84,6 +84,7 @@ def sensitivity(
         raise InputError(
             f"`state` must be regular; got a critical one, {state}. See `limit_sensitivity`."
         )
+    _check_pushes(state, chosen)
     directions = np.eye(len(structure.parameters))[at]
     dz = _tangents(state, directions)
     slopes = {each.name: _slopes(state, each, dz, directions) for each in descriptors}
@@ -121,12 +122,13 @@ def limit_sensitivity(
     ------
     InputError
         If the limit is a branch point, where imperfections act with a fractional power
-        (`imperfection_law`), or has no derivative, a name is unknown, or its constraint is not
-        given.
+        (`imperfection_law`), or has no derivative, a parameter takes away its orbit, a
+        name is unknown, or its constraint is not given.
     """
     structure, state = limit.state.structure, limit.state
     places = {name: position(structure.parameters, name) for name in (*names, load)}
     if limit.kind == "fold":
+        _check_pushes(state, names)
         _, phi = _null_vector(state)
         slopes = {name: float(phi @ _column(state, place)) for name, place in places.items()}
         size = np.linalg.norm(phi) * np.linalg.norm(_column(state, places[load]))
@@ -149,6 +151,22 @@ def limit_sensitivity(
             "changes with a fractional power of imperfections. See `imperfection_law`."
         )
     raise InputError(f"`limit` must be a fold or a constraint; got {limit.kind!r}.")
+
+
+def _check_pushes(state: State, names: Sequence[str]) -> None:
+    """Refuse parameters beside which a state on an orbit has one place only: it jumps there."""
+    structure, z, p = state.structure, state.z[None], state.p[None]
+    if not structure.along_orbits(z, p).any() or not structure.have_orbits(p)[0]:
+        return
+    for name in names:
+        place = position(structure.parameters, name)
+        moved = p.copy()
+        moved[0, place] += structure.scales[place]
+        if not structure.have_orbits(moved)[0]:
+            raise InputError(
+                "`names` must hold parameters that keep the orbit of the state; got "
+                f"{name}, which picks one state of it, however small its change."
+            )
 
 
 def _tangents(
