@@ -97,6 +97,17 @@ def test_two_thirds_law_of_the_arch():
     assert law.coefficient == pytest.approx(-4.0999, abs=2e-3)
 
 
+def test_sizes_of_imperfections_are_in_the_unit_of_the_parameter():
+    """The fitted formula gives the limit loads at the sizes; 1e-3: its next order."""
+    joints = {"A": (-100.0, 0.0), "B": (0.0, 30.0), "C": (100.0, 0.0)}
+    loads = {"F": {"B": (0.0, -1.0)}, "w": {"B": (1.0, 0.0)}}
+    truss = em.Truss(joints, [("A", "B"), ("B", "C")], {"A": "xy", "C": "xy"}, loads)
+    law = imperfection_law(truss.natural_state(), "F", "w")
+    assert law.power == 2.0
+    fitted = law.coefficient * np.abs(law.sizes) ** law.power
+    np.testing.assert_allclose(law.loads - law.perfect, fitted, rtol=1e-3)
+
+
 def test_two_thirds_law_of_the_normal_form():
     """−x³ − a x = b folds at a = −3 (b/2)^⅔."""
     structure = pitchfork_form(-1.0)

@@ -92,7 +92,8 @@ class ImperfectionLaw:
     perfect
         Limit load without the imperfection.
     sizes, loads
-        Imperfections that were tried, with their signs, and limit loads.
+        Imperfections that were tried, with their signs, in the unit of the parameter, and limit
+        loads.
     """
 
     status: Literal["fitted", "refused"]
@@ -184,7 +185,7 @@ def imperfection_law(
         fit.exponent,
         fit.coefficient / parameters[place].scale ** fit.power,
         trials.perfect.value,
-        np.concatenate([tried, -tried]),
+        parameters[place].scale * np.concatenate([tried, -tried]),
         loads.ravel(),
     )
 
