@@ -3,15 +3,20 @@
 import numpy as np
 import pytest
 from hypothesis import example, given, settings, strategies as st
+from scipy.optimize import brentq
 
 import equimorph as em
+from equimorph.equilibria import ParameterLine, TraceOptions
+from equimorph.equilibria.trace import trace
 from oracles.polynomial import (
+    Polynomial,
     bead_on_a_circle,
     fold_form,
     pitchfork_form,
     slaved,
     transcritical_form,
 )
+from oracles.surfaces import butterfly
 
 factors = st.floats(0.1, 10.0)
 starts = st.floats(0.1, 2.0)
@@ -193,3 +198,48 @@ def test_index_at_an_end_just_behind_a_fold_or_branch_point_is_that_of_its_state
     path = em.lift(pitchfork.state(0.0, 0.0, a=-1.0), {"a": beyond}, through_folds=True)
     assert [event.kind for event in path.events] == ["branch point", "arrived"]
     assert path.index[-1] == path.end.state.index == 1
+
+
+@pytest.mark.parametrize("end", [1e-4, 1e-3, 1e-2])
+@pytest.mark.parametrize("share", [0.8, 0.95, 0.99, 0.999, 0.9999])
+def test_a_bound_just_before_the_end_of_a_bent_path_ends_it(end, share):
+    """x³ + 0.002 x = a, y = 3 x², x bounded by its value at a share of the way.
+
+    The end of the way and the bound may lie in one step, whose chord is shorter than the path.
+    """
+    steep = Polynomial(lambda x, a: x**4 * 0.25 + x**2 * 0.001 - x * a, 1, ("a",))
+    form = slaved(steep, 1.0, 3.0)
+    begin, stop = -1e-6, share * (end + 1e-6) - 1e-6
+    x, bound = (brentq(lambda x, a=a: x**3 + 0.002 * x - a, -3.0, 3.0) for a in (begin, stop))
+    along = em.Descriptor("along", "1", lambda z, p: z[:, 0])
+    start = form.state(x, 3.0 * x * x, a=begin)
+    path = em.lift(start, {"a": end}, within=[along <= bound])
+    assert path.end.kind == "constraint"
+    assert path.end.state["a"] == pytest.approx(stop, abs=1e-10)
+
+
+def test_two_folds_that_a_long_step_may_pass_are_met():
+    """x⁵ + a x³ + b x + c along a line through the tail of a butterfly: folds by its derivative.
+
+    As edges of sets are lifted at first: without a look at the eigenvalues inside of steps.
+    """
+    form = butterfly()
+    start, end = (
+        np.array([-0.098344, 0.000188, -0.000217]),
+        np.array([-0.10105, -0.000369, 0.000823]),
+    )
+    line = ParameterLine(form, start[None], (end - start)[None])
+    x = min(
+        np.roots([1.0, 0.0, start[0], 0.0, start[1], start[2]]).real, key=lambda x: abs(x + 0.147)
+    )
+    options = TraceOptions(
+        through_folds=True, through_branch_points=True, first_step=0.05, largest_step=0.5,
+        smallest_step=1e-7, turning=0.25, look_inside=False,
+    )  # fmt: skip
+    found = trace(line, np.array([[x]]), (), options)
+    places = np.linspace(-0.147, 0.32, 200_001)
+    powers = np.stack([places**3, places, np.ones_like(places)])
+    t = -(places**5 + start @ powers) / ((end - start) @ powers)
+    turns = places[1:-1][np.diff(np.sign(np.diff(t))) != 0]
+    assert len(turns) == 3
+    np.testing.assert_allclose(found.passed.z[:, 0], turns, atol=1e-5)

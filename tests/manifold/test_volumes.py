@@ -33,7 +33,7 @@ from equimorph.model import Box, Descriptor
 from equimorph.structures import Rod, Spring
 from oracles.complexes import assert_faithful, assert_folds_are_singular
 from oracles.polynomial import Polynomial
-from oracles.surfaces import integral, swallowtail
+from oracles.surfaces import butterfly, integral, swallowtail
 from typecheck import unchecked
 
 BOX = Box(a=(-1.3, 1.2), b=(-1.5, 1.4), c=(-1.4, 1.3))
@@ -197,6 +197,41 @@ def test_a_swallowtail_is_a_ball_with_one_fold(box):
     assert eset.audit.clean, eset.audit
     assert topology(eset) == (1, 1, 1)
     assert [euler_characteristic(fold) for fold in eset.folds] == [1]
+
+
+NARROW = Box(a=(-2.0, 0.5), b=(-0.3, 1.1), c=(-0.5, 0.43))
+WIDE = Box(a=(-1.5, 0.7), b=(-0.4, 0.9), c=(-0.45, 0.5))
+OFF = Box(a=(-0.93, 1.2), b=(-0.8, 1.1), c=(-0.7, 1.13))
+
+
+@pytest.mark.parametrize(
+    ("tilt", "skew", "box", "grid"),
+    [
+        (0.0, 0.0, NARROW, (5, 5, 4)),
+        pytest.param(0.3, 0.2, WIDE, (5, 5, 4), marks=pytest.mark.slow),
+        *(
+            pytest.param(*form, box, grid, marks=pytest.mark.slow)
+            for form in ((0.0, 0.0), (0.3, 0.2))
+            for box in (NARROW, WIDE, OFF)
+            for grid in ((4, 5, 5), (6, 5, 7))
+        ),
+    ],
+)
+def test_a_butterfly_has_as_many_states_as_its_polynomial_has_roots(tilt, skew, box, grid):
+    """Three cusps near one point: two chords of folds never turn at the same one.
+
+    Over the first two boxes the ways to join folds were ambiguous, and steps passed two folds in
+    the tail, where the slope of the cubic along a step only comes close to zero.
+    """
+    with unchecked():
+        eset = equilibrium_set(butterfly(tilt, skew), box, intervals=grid, checks=0)
+    assert eset.audit.clean, eset.audit
+    assert topology(eset) == (1, 1, 1)
+    a, b, c = np.random.default_rng(5).uniform(box.lower, box.upper, (300, 3)).T
+    found = np.bincount(eset.over(a=a, b=b, c=c).point, minlength=len(a))
+    for count, at in zip(found, zip(a, b, c, strict=True), strict=True):
+        roots = np.roots([1.0, 0.0, at[0], skew * at[1], at[1], at[2] + tilt * at[0]])
+        assert count == (np.abs(roots.imag) < 1e-9).sum()
 
 
 def test_spring_over_actuator_load_and_stiffness():

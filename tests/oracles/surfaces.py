@@ -32,6 +32,15 @@ def swallowtail() -> Polynomial:
     return Polynomial(lambda x, a, b, c: integral(x**4 + a * x**2 + b * x + c), 1, ("a", "b", "c"))
 
 
+def butterfly(tilt: float = 0.0, skew: float = 0.0) -> Polynomial:
+    """x⁵ + a x³ + skew b x² + b x + c + tilt a: pitchforks that turn subcritical, unfolded by c."""
+    return Polynomial(
+        lambda x, a, b, c: integral(x**5 + a * x**3 + b * (x + skew * x**2) + c + tilt * a),
+        1,
+        ("a", "b", "c"),
+    )
+
+
 def three_sheets() -> Polynomial:
     """x³ − 9x + (a + b)/2: three sheets that never meet for |a|, |b| < 10."""
     return Polynomial(lambda x, a, b: integral(x**3 - 9.0 * x + 0.5 * a + 0.5 * b), 1, ("a", "b"))

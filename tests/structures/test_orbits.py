@@ -7,6 +7,7 @@ import pytest
 from scipy.linalg import eigh, null_space
 
 import equimorph as em
+from equimorph.equilibria.critical import Critical, null_border
 from equimorph.errors import InputError
 from equimorph.structures.spatial.mechanics import SpatialMechanics
 from equimorph.structures.spatial.quaternions import (
@@ -111,7 +112,7 @@ def test_fold_is_the_limit_of_folds_of_rods_without_orbits(closing):
     ],
 )
 def test_solves_with_a_spring_and_two_borders_are_those_of_the_whole_matrix(options):
-    """Solutions, inertia and determinant, with borders and shifts, also on the axis.
+    """Solutions, inertia and determinant, with borders and shifts, on the axis without borders.
 
     Against F_z with the condition, eliminated with pivots; 1e-8: conditions reach 1e7.
     """
@@ -136,10 +137,14 @@ def test_solves_with_a_spring_and_two_borders_are_those_of_the_whole_matrix(opti
             sides = rng.standard_normal((lanes, 3, size + k))
             found = mechanics.solve(z, p, sides, border, shift)
             whole = mechanics.layout.solve(entries, border, sides)
-            scale = np.abs(whole.x).max(axis=(1, 2), keepdims=True)
-            np.testing.assert_allclose(found.x / scale, whole.x / scale, atol=1e-8, rtol=0.0)
-            np.testing.assert_array_equal(found.negative, whole.negative)
-            known = np.isfinite(whole.determinant)
+            # on the axis: `test_on_the_axis_a_border_leaves_the_pair_one_null_vector`
+            told = np.flatnonzero(~mechanics.on_axis(z)) if k else np.arange(lanes)
+            scale = np.abs(whole.x[told]).max(axis=(1, 2), keepdims=True)
+            np.testing.assert_allclose(
+                found.x[told] / scale, whole.x[told] / scale, atol=1e-8, rtol=0.0
+            )
+            np.testing.assert_array_equal(found.negative[told], whole.negative[told])
+            known = told[np.isfinite(whole.determinant[told])]
             np.testing.assert_allclose(found.determinant[known], whole.determinant[known], 1e-7)
             assert found.pivoted.mean() < 0.1
 
@@ -220,7 +225,8 @@ def test_a_strip_has_no_orbits_and_takes_no_condition():
 def test_on_the_axis_two_eigenvalues_vanish_at_once(phase, pull):
     """Greenhill's combined load, clamped, by the determinant of its linear equation; C = 3.
 
-    There the condition is void: the double eigenvalue is named a multiple point, no fold.
+    The double eigenvalue is named a multiple point, no fold; a branch point where the condition
+    picks the branch.
     """
     rod = em.SpatialRod(
         torsion=3.0, lateral=1.0, ends=("clamped", "guided"), phase=phase,
@@ -228,9 +234,40 @@ def test_on_the_axis_two_eigenvalues_vanish_at_once(phase, pull):
     )  # fmt: skip
     legs = [{"P": -pull}, {"twist_B": 5.0}] if pull else {"twist_B": 5.0}
     end = em.lift(rod.natural_state(), legs).end
-    assert (end.kind, end.state.index) == ("multiple point", 0)
+    assert end.kind == ("branch point" if phase else "multiple point")
+    assert not phase or end.criticality in {"supercritical", "subcritical"}
     moment = clamped_buckling_moment(pull * 4.0 * np.pi**2)
     assert 3.0 * end.state["twist_B"] == pytest.approx(moment, rel=1e-7)
+
+
+def test_on_the_axis_a_border_leaves_the_pair_one_null_vector():
+    """At Euler's load: bordered, F_z is regular; the vector is null, and keeps to the condition.
+
+    Against dense algebra: two eigenvalues vanish, and the third does not. Off that load the index
+    is that without a border.
+    """
+    options = {"ends": ("clamped", "guided"), "loads": {"P": em.PointForce(1.0, (-1.0, 0.0, 0.0))}}
+    rod = em.SpatialRod(torsion=1.0, lateral=1.0, **options, phase=True)
+    mechanics, end = rod.mechanics, em.lift(rod.natural_state(twist_B=0.7), {"P": 1.5}).end
+    assert end.kind == "branch point"
+    z, p = end.state.z[None], end.state.p[None]
+    values = np.sort(np.abs(bare_spectrum(rod, end.state)[1]))
+    assert values[1] < 1e-9
+    assert values[2] > 0.01
+    b = null_border(rod, z, p)
+    null = Critical(rod, z, p, b)
+    assert abs(null.g[0]) < 1e-9
+    assert np.abs(mechanics.layout.dense(mechanics.entries(z, p))[0] @ null.v[0]).max() < 1e-8
+    moved = rod.residual(z + 1e-3 * null.v, p)[0, -1] - rod.residual(z - 1e-3 * null.v, p)[0, -1]
+    assert abs(moved) < 1e-7
+    for load, index in ((0.9, 0), (1.1, 2)):
+        place = p + (np.array([each.name for each in rod.parameters]) == "P") * (load - p[0, -1])
+        held = rod.natural_state(twist_B=0.7)
+        straight = em.lift(held, {"P": load}, through_folds=True).end.state
+        border = b[:, None], b[:, None], np.zeros((1, 1, 1))
+        nothing = np.zeros((1, 0, rod.size + 1))
+        solved = rod.solve(straight.z[None], place, nothing, border)
+        assert solved.negative[0] - rod.constraints == index == straight.index
 
 
 def ring(rod):

@@ -72,7 +72,8 @@ def locate_goal(curve: Curve, bracket: Bracket, goal: float) -> Located:
         cubic_shares(*ends, share)
         z[beyond], found[beyond] = polish(curve, hermite(bracket, share)[0], t[beyond])
         found[beyond] &= _inside(curve, bracket, z[beyond], t[beyond])
-        step[beyond] *= share
+        # measured as where folds and constraints are: which of them comes first decides the end
+        step[beyond] = _arclength(curve, bracket, z[beyond], t[beyond], share)
     return Located(z, t, step, found)
 
 

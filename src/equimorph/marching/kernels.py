@@ -234,6 +234,9 @@ def judge(index, determinant, numbers, counts, active, smallest, locates, plain)
         start, end = numbers[T, i], numbers[TRIAL, i]
         flipped = np.sign(new) != np.sign(old)
         changed = abs(index[i] - counts[INDEX, i])
+        # a pair of eigenvalues that is always one by symmetry counts once in the determinant
+        if changed == 2 and determinant[i] * numbers[DET, i] < 0.0:
+            changed = 1
         # at a fold the path turns and the index changes; at a branch point one without the other
         fold = flipped and (changed == 1 or not plain)
         what = FOLD if fold else (BRANCH if flipped or changed == 1 else 0)
@@ -269,8 +272,8 @@ def _turns_twice(old, new, gain, length):
     """Whether t runs back inside a step that leaves it rising, or falling, at both ends.
 
     By the least slope of the cubic through both ends and slopes: near a cusp two folds lie close
-    together, with the same index before and behind. In a short step that may be an error of the
-    cubic, where the slope touches zero.
+    together, with the same index before and behind. In a long step the cubic may miss them where
+    its slope is nearly zero, in a short one that may be an error where the slope touches zero.
     """
     sign = np.sign(old)
     rise, a, b = sign * gain / length, sign * old, sign * new
@@ -279,8 +282,10 @@ def _turns_twice(old, new, gain, length):
     # slope at share s: a + 2 s (3 rise - 2 a - b) + 3 s² (a + b - 2 rise)
     bend, bow = 3 * rise - 2 * a - b, a + b - 2 * rise
     share = min(max(-bend / (3 * bow), 0.0), 1.0) if bow > 0.0 else 0.0
-    slack = max(SLACK * min(a, b), ROUND_OFF / length) if length <= WIDE else 0.0
-    return a + 2 * share * bend + 3 * share * share * bow < -slack
+    least = a + 2 * share * bend + 3 * share * share * bow
+    if length > WIDE:
+        return least < NEAR * min(a, b)
+    return least < -max(SLACK * min(a, b), ROUND_OFF / length)
 
 
 @njit(**SUMS)

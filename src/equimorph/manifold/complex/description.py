@@ -285,7 +285,7 @@ def _audit(
         non_manifold=int((whole.counts > most).sum()),
         crossings=int(crossed.sum()),
         contradictions=sense.contradictions
-        + count_unbalanced(corners, whole, sense, crossed & whole_crossing),
+        + count_unbalanced(corners, cell_index, whole, sense, crossed & whole_crossing),
         overturned=int(sense.overturned.sum()),
         wrong=int(wrong.sum()),
         euler_characteristic=euler_characteristic(corners, edges),

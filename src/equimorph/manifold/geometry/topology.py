@@ -25,7 +25,7 @@ from equimorph.manifold.geometry.kernels import orient
 from equimorph.manifold.geometry.simplices import volumes
 
 PAIR = 2
-"""Corners of an edge."""
+"""Corners of an edge, eigenvalues that vanish together, halves of a sheet."""
 
 
 @dataclass(frozen=True)
@@ -301,15 +301,27 @@ def senses(
 
 
 def count_unbalanced(
-    cells: Cells, whole: Adjacency, sense: Senses, facets: Bool[np.ndarray, " F"]
+    cells: Cells,
+    index: CellNumbers,
+    whole: Adjacency,
+    sense: Senses,
+    facets: Bool[np.ndarray, " F"],
 ) -> int:
     """Number of the facets whose cells, with the orientation of their index, do not cancel.
 
-    As they do where sheets cross: det [F_z F_p; tᵀ] changes its sign along each of them.
+    As they do where sheets cross: det [F_z F_p; tᵀ] changes its sign along each of them. Where a
+    pair of eigenvalues vanishes it does so on one of the two alone, whose halves are left over.
     """
+    if len(cells) == 0:
+        return 0
+    around, count = whole.cell_facets.ravel(), len(whole.counts)
     induced = _induced_signs(cells) * sense.signs[:, None]
-    total = np.bincount(whole.cell_facets.ravel(), weights=induced.ravel())
-    return int((total[facets] != 0).sum()) if len(cells) else 0
+    total = np.bincount(around, weights=induced.ravel(), minlength=count)
+    own = np.repeat(index, cells.shape[1])
+    most, least = np.full(count, own.min()), np.full(count, own.max())
+    np.maximum.at(most, around, own)
+    np.minimum.at(least, around, own)
+    return int((np.abs(total) != np.where(most - least == PAIR, PAIR, 0))[facets].sum())
 
 
 def cut_at_crossings(

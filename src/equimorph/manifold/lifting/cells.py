@@ -10,6 +10,7 @@ from equimorph.arrays import Bool, CellNumbers, Facets, Float, Int, Items
 from equimorph.manifold.complex.description import Complex, Frame, Lifting, describe
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.manifold.geometry.points import VertexKind
+from equimorph.manifold.geometry.topology import PAIR
 from equimorph.manifold.lifting.balls import Balls, fill
 from equimorph.manifold.lifting.crossing_branches import lonely
 from equimorph.manifold.lifting.discs import Discs, assemble
@@ -253,13 +254,19 @@ def _facets_in_use(facets: Facets) -> Int[np.ndarray, "m d"]:
 def _parity_violations(pairing: Pairing) -> int:
     """Curves whose ends contradict sign det F_z: equal parity across, opposite on return.
 
-    It is the other way round behind a crossing, where det [F_z F_t; tᵀ] changes its sign.
+    It is the other way round behind a crossing, where det [F_z F_t; tᵀ] changes its sign, but not
+    where the index changes by a pair.
     """
     curves, points = pairing.curves, pairing.points
     own = np.repeat(list(curves.inner), [len(inner) for inner in curves.inner.values()])
     inner = np.array([point for inner in curves.inner.values() for point in inner], int)
     crossings = own[points.kind[inner] == VertexKind.CROSSING].astype(int)
     crossed = np.bincount(crossings, minlength=curves.count)
+    for curve in np.unique(crossings).tolist():
+        way = [int(curves.start[curve]), *curves.inner[curve], int(curves.end[curve])]
+        at = np.flatnonzero(points.kind[way[1:-1]] == VertexKind.CROSSING)
+        change = points.index[np.take(way, at)] - points.index[np.take(way, at + 2)]
+        crossed[curve] -= np.count_nonzero(np.abs(change) == PAIR)
     closed = curves.end >= 0
     start, end = curves.start[closed], curves.end[closed]
     returned = (points.vertex[start] == points.vertex[end]).astype(int)

@@ -5,10 +5,11 @@ of it, but for cusps, at which it turns back in the parameters.
 """
 
 from collections.abc import Sequence
+from itertools import combinations
 
 import numpy as np
 
-from equimorph.arrays import Flags, Float, Places
+from equimorph.arrays import Float, Places
 from equimorph.equilibria.critical_tests import correct_singular_states, gap, quadratic
 from equimorph.manifold.geometry.exact_points import middles
 from equimorph.manifold.geometry.setting import embed
@@ -17,6 +18,7 @@ from equimorph.manifold.geometry.tangents import fold_forms
 from equimorph.manifold.lifting.crossing_discs import Ways
 from equimorph.manifold.lifting.pairing import Pairing
 from equimorph.manifold.lifting.polygon_cuts import TURN, Chord, Plan, planes
+from equimorph.tolerances import SAME_STATE
 
 SAME_SIDE = 0.3
 """Least cosine between the sides of two folds that can belong to one fold curve in a triangle."""
@@ -61,11 +63,13 @@ def continuous_ways(pairing: Pairing, plans: list[Plan], choices: list[Ways]) ->
     # where no way is smooth, a cusp lies in the triangle
     turning = [each for each, cosine in chords.items() if not left[each[0]] and cosine < -SAME_SIDE]
     ends = [(plans[number].polygon.triangle, chord) for number, chord in turning]
-    good = _lead_through_cusps(pairing, ends)
-    cusped = {each for each, own in zip(turning, good.tolist(), strict=True) if own}
-    return [
-        own or others for own, others in zip(left, _ways_of(choices, smooth | cusped), strict=True)
+    cusps = dict(zip(turning, _cusps_between(pairing, ends), strict=True))
+    cusped = {each for each, cusp in cusps.items() if cusp is not None}
+    more = [
+        [way for way in ways if _are_apart([cusps.get((number, chord)) for chord in way])]
+        for number, ways in enumerate(_ways_of(choices, smooth | cusped))
     ]
+    return [own or others for own, others in zip(left, more, strict=True)]
 
 
 def _ways_of(choices: list[Ways], good: set[tuple[int, Chord]]) -> list[Ways]:
@@ -74,6 +78,12 @@ def _ways_of(choices: list[Ways], good: set[tuple[int, Chord]]) -> list[Ways]:
         [way for way in ways if all((number, chord) in good for chord in way)]
         for number, ways in enumerate(choices)
     ]
+
+
+def _are_apart(cusps: Sequence[Float[np.ndarray, " coordinates"] | None]) -> bool:
+    """Whether no two chords lead through one cusp: it lies on one fold only."""
+    known = [cusp for cusp in cusps if cusp is not None]
+    return all(np.linalg.norm(a - b) > SAME_STATE for a, b in combinations(known, 2))
 
 
 def _along_sides(
@@ -90,10 +100,12 @@ def _along_sides(
     return np.stack([first, (2.0 * second - first) / np.sqrt(3.0)], axis=1)
 
 
-def _lead_through_cusps(pairing: Pairing, chords: Sequence[tuple[int, Chord]]) -> Flags:
-    """Whether a cusp in the triangle of each chord lies on the fold between both its ends."""
+def _cusps_between(
+    pairing: Pairing, chords: Sequence[tuple[int, Chord]]
+) -> list[Float[np.ndarray, " coordinates"] | None]:
+    """Place of the cusp in the triangle of each chord on the fold between both its ends, if any."""
     if not chords:
-        return np.zeros(0, bool)
+        return []
     setting, mesh, points = pairing.setting, pairing.mesh, pairing.points
     triangles, ends = [each for each, _ in chords], [chord for _, chord in chords]
     z, p, _ = middles(setting, points, ends)
@@ -105,4 +117,5 @@ def _lead_through_cusps(pairing: Pairing, chords: Sequence[tuple[int, Chord]]) -
     way = np.linalg.norm(cusp - one, axis=1) + np.linalg.norm(cusp - other, axis=1)
     corners = mesh.vertices[mesh.triangles[triangles]]
     inside = (shares_in(corners, found.p[:, setting.free]) > 0.0).all(axis=1)
-    return np.asarray(found.found & inside & (way < DETOUR * np.linalg.norm(other - one, axis=1)))
+    between = found.found & inside & (way < DETOUR * np.linalg.norm(other - one, axis=1))
+    return [place if there else None for place, there in zip(cusp, between.tolist(), strict=True)]

@@ -31,6 +31,7 @@ from equimorph.arrays import (
 )
 from equimorph.columns import Columns
 from equimorph.equilibria.critical import Critical, null_border
+from equimorph.equilibria.hidden_events import multiplicity
 from equimorph.equilibria.newton_step import Planes
 from equimorph.equilibria.point_conditions import Plane
 from equimorph.equilibria.settle import Guards, lower_index, settle
@@ -235,8 +236,10 @@ class NearCrossings:
         x = _improve(series, x)
         z, r, slope, good = self._along(own, p[own.point], x * WIDE / own.size)
         good &= (np.abs(r) <= RESIDUAL) & (np.abs(x) <= 1.0)
-        # the slope has the sign of the eigenvalue that nearly vanishes
-        index = own.low + (slope < 0.0)
+        # the slope has the sign of the eigenvalue that nearly vanishes, once or as one of a pair
+        near = 2.0 * np.abs(slope) / own.size**2
+        several = multiplicity(self.setting.structure, z, p[own.point], near)
+        index = own.low + np.where(slope < 0.0, np.maximum(several, 1), 0)
         return Branches(z[good], own.point[good], index[good]), (x * WIDE)[good]
 
     def on_branches(self, centres: Centres, p: Parameters, z: Lanes, point: Numbers) -> Flags:

@@ -243,11 +243,15 @@ class SpatialMechanics(SpatialLagrangian, JointEquations):
         rhs: Sides,
         around: Border,
         shift: Shift,
+        last: Lanes | None = None,
     ) -> BorderedSolution:
-        """Solutions where those flagged come from the sparse solve."""
+        """Solutions where those flagged come from the sparse solve, with a last row if given."""
         unsafe = found.pivoted
         if unsafe.any():
             entries = self.entries(z[unsafe], p[unsafe], None if shift is None else shift[unsafe])
+            if last is not None:
+                own = self.layout.rows == self.size - 1
+                entries[:, own] = last[unsafe][:, self.layout.columns[own]]
             some = tuple(np.ascontiguousarray(each[unsafe]) for each in around)
             again = self.layout.solve(entries, (some[0], some[1], some[2]), rhs[unsafe])
             found.x[unsafe], found.negative[unsafe] = again.x, again.negative

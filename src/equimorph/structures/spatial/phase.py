@@ -8,7 +8,12 @@ along it, so that ``μ (ξ·∇c) = 0``: with ``ξ·∇c = ∫ g t_y ds ≠ 0`` 
 those of the rod, and the direction ξ is among the constraints: neither negative nor zero.
 
 On the axis ξ = 0, there is nothing to pin, and the condition is void: μ = 0 stands in its place.
-See docs/decisions.md, "Orbits".
+Eigenvalues of F_z with modes across the axis are double there: a mode and the same a quarter turn
+on. Where a pair vanishes, a circle of orbits branches off, of which the condition picks two states,
+as at a pitchfork. So bordered solves hold the mode of the pair nearest to zero that the condition
+holds: one null vector is left, that of the branch. Steps tell the product of the pairs' eigenvalues
+as determinant, each once: it changes its sign where the index changes by two.
+See docs/decisions.md, "Orbits" and "Pairs of eigenvalues on the axis".
 """
 
 from dataclasses import replace
@@ -33,6 +38,9 @@ ON_AXIS = 1e-10
 """Length of ξ in the metric below which a state lies on the axis."""
 NEAR_AXIS = 1e-12
 """Angles, places and loads across the axis that are none: round-off of the way to them."""
+NEAR_PAIR, INVERSE, RAYLEIGH = 1e-7, 3, 2
+"""Distance from an eigenvalue at which inverse iteration looks for it: nearer, round-off parts the
+pair and turns its mode; steps of it near zero, and then near the quotient, which cube the error."""
 NO_FORCE = 1e-8
 """Multiplier of the phase condition that is none, in units of 4π²B/L²."""
 
@@ -67,9 +75,14 @@ class PinnedMechanics(SpatialMechanics):
         """Solve with F_z − shift·mass, bordered: that of the rod itself, with two borders more.
 
         That of the condition, ∂F/∂μ; and that which takes out a spring against the turn of one
-        cross-section about the axis, with which F_z of the rod itself is regular.
+        cross-section about the axis, with which F_z of the rod itself is regular. On the axis a
+        border, as is given to nearly singular matrices, lets the condition hold one of a pair.
         """
-        own = self.equations(z, p, self._along(z, p))[1]
+        own, below = self.equations(z, p, self._along(z, p))[1], np.zeros(len(z), bool)
+        void = np.flatnonzero(self.on_axis(z)) if border is not None else np.zeros(0, int)
+        if len(void):
+            shifts = None if shift is None else shift[void]
+            own[void], below[void] = self._hold_pairs(z[void], p[void], shifts)
         around = no_border(len(z), self.size) if border is None else border
         springs, turn = self._springs(z)
         columns, rows = (
@@ -90,7 +103,32 @@ class PinnedMechanics(SpatialMechanics):
             springs,
         )
         found = replace(found, x=np.delete(found.x, self.size, axis=-1))
-        return self.pivot(found, z, p, rhs, around, shift)
+        found = self.pivot(found, z, p, rhs, around, shift, own)
+        found.negative[below] += 1
+        return found
+
+    def _hold_pairs(self, z: Lanes, p: Parameters, shift: Shift) -> tuple[Lanes, Flags]:
+        """Conditions on the axis that hold one of the pair nearest to zero; if that is negative.
+
+        By inverse iteration on the gradient of the condition: the mode of the pair that has it, the
+        only one of the two on which the condition depends.
+        """
+        n, lanes = self.unknowns, len(z)
+        bare = np.concatenate([z[:, :-1], np.zeros((lanes, 1))], axis=1)
+        side = super().equations(bare, p, self._along(z, p))[1]
+        given = np.zeros(lanes) if shift is None else shift
+        mode, value = side[:, :n] / self.mass, np.zeros(lanes)
+        for number in range(INVERSE + RAYLEIGH):
+            mode /= np.sqrt(mode**2 @ self.mass)[:, None]
+            side[:, :n], side[:, n:] = self.mass * mode, 0.0
+            near = value - NEAR_PAIR
+            yielding = self.solve(z, p, side[:, None], None, given + near).x[:, 0, :n]
+            if number >= INVERSE - 1:
+                value = near + 1.0 / (side[:, :n] * yielding).sum(axis=1)
+            mode = yielding
+        mode /= np.sqrt(mode**2 @ self.mass)[:, None]
+        side[:, :n] = self.mass * mode
+        return side, np.asarray(value < 0.0)
 
     def _along(self, z: Lanes, p: Parameters) -> Direction:
         """The direction of μ."""
@@ -158,7 +196,11 @@ class PinnedMechanics(SpatialMechanics):
         scale = np.divide(rate, 2.0 * springs[:, 1], out=np.ones(len(z)), where=rate != 0.0)
         with np.errstate(over="ignore"):  # of rods with many elements
             step.determinant[:] *= -(scale**2)
-        return self.pivot_steps(step, ratio, z, p, dp, row, corner, defect)
+        step = self.pivot_steps(step, ratio, z, p, dp, row, corner, defect)
+        void = self.on_axis(z)
+        pairs = 1.0 - 2.0 * (step.index[void] // 2 % 2)
+        step.determinant[void] = pairs * np.sqrt(np.abs(step.determinant[void]))
+        return step
 
     def velocity(self, z: Lanes) -> Lanes:
         """ξ: quaternions change by (0, 0, −q₃, q₂), forces of the supports by (0, −f_z, f_y)."""

@@ -1,0 +1,92 @@
+"""Sets of round rods that buckle off their axis, where pairs of eigenvalues vanish."""
+
+import numpy as np
+import pytest
+
+import equimorph as em
+from equimorph.manifold import VertexKind
+from oracles.complexes import assert_crossings
+from oracles.kirchhoff import clamped_buckling_moment
+from oracles.spatial_rods import coaxial
+
+
+@pytest.fixture(scope="module")
+def rod():
+    """A round rod between clamps under thrust, with the phase condition."""
+    return em.SpatialRod(
+        torsion=3.0, lateral=1.0, ends=("clamped", "guided"), phase=True,
+        loads={"P": em.PointForce(1.0, (-1.0, 0.0, 0.0))}, elements=4, degree=5,
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def column(rod):
+    """Its set over the thrust, untwisted, past the first two Euler loads."""
+    within = [rod.max_curvature <= 5.0]
+    fixed = {"twist_A": 0.0, "twist_B": 0.0}
+    return em.equilibrium_set(
+        rod, em.Box(P=(0.6, 2.3)), fixed=fixed, within=within, intervals=(6,), checks=0
+    )
+
+
+def test_a_column_buckles_at_both_euler_loads_by_a_pair(column):
+    """λ₁ = 1, λ₂ = (x/π)² with tan x = x; the index of the straight one: 0, 2, 4.
+
+    Branches have the index of the straight column below their load; of each circle of states the
+    condition picks two. Tolerance: four elements of degree 5.
+    """
+    assert column.audit.clean
+    assert_crossings(column, vanishing=2)
+    loads = np.sort(column.points[column.kinds == VertexKind.CROSSING]["P"])
+    np.testing.assert_allclose(loads, [1.0, (4.493409457909064 / np.pi) ** 2], rtol=5e-7)
+    assert sorted(piece.index for piece in column.strata) == [0, 0, 0, 2, 2, 2, 4]
+    for load, index in ((0.8, [0]), (1.02, [0, 0, 2]), (1.5, [2]), (2.1, [2, 2, 4])):
+        assert sorted(state.index for state in column.at(P=load)) == index
+
+
+@pytest.mark.parametrize("distance", [1e-7, 1e-5, 1e-3])
+def test_states_next_to_a_pair_have_their_own_index(column, distance):
+    """Within 1e-4 of a crossing states are roots of the reduced equation."""
+    first = column.points[column.kinds == VertexKind.CROSSING]["P"].min()
+    states = column.at(P=first + distance)
+    assert sorted(state.index for state in states) == [0, 0, 2]
+    at = column.over(P=np.array([first - distance, first + distance]))
+    np.testing.assert_array_equal(np.sort(at.index), [0, 0, 0, 2])
+
+
+def test_the_set_over_twist_and_tension_buckles_along_greenhills_curve(rod):
+    """Every crossing, by the determinant of the linear equation of a clamped rod; C = 3.
+
+    Tolerance: as before.
+    """
+    box, within = em.Box(P=(-0.6, -0.1), twist_B=(2.2, 3.8)), [rod.max_curvature <= 8.0]
+    eset = em.equilibrium_set(
+        rod, box, fixed={"twist_A": 0.0}, within=within, intervals=(2, 4), checks=0
+    )
+    assert eset.audit.clean
+    assert_crossings(eset, vanishing=2)
+    assert sorted(piece.index for piece in eset.strata) == [0, 0, 0, 2]
+    assert len(eset.crossings) == 1
+    met = eset.points[eset.kinds == VertexKind.CROSSING]
+    for tension, twist in zip(-met["P"] * 4.0 * np.pi**2, met["twist_B"], strict=True):
+        assert 3.0 * twist == pytest.approx(clamped_buckling_moment(tension), rel=1e-7)
+
+
+@pytest.mark.slow
+def test_random_searches_find_the_states_of_the_set():
+    """Independent of lifting: energies and indices over points on both sides of the crossings."""
+    rod, _, _ = coaxial()
+    within, fixed = [rod.max_curvature <= 6.0], {"twist_A": 0.57, "twist_B": 0.37}
+    box = em.Box(P=(-0.15, 0.48), nu=(0.77, 0.81))
+    eset = em.equilibrium_set(rod, box, fixed=fixed, within=within, intervals=(3, 3))
+    assert eset.audit.clean
+    assert_crossings(eset, vanishing=2)
+    generator = np.random.default_rng(4)
+    for _ in range(25):
+        at = dict(zip(box.names, generator.uniform(box.lower, box.upper).tolist(), strict=True))
+        found = em.find_equilibria(rod, fixed | at, within=within)
+        told = [
+            sorted((round(s.energy, 8), s.index) for s in each) for each in (found, eset.at(**at))
+        ]
+        assert set(told[0]) <= set(told[1])
+        assert len(told[1]) in {1, 3}
