@@ -79,6 +79,22 @@ def test_help_loads_nothing_heavy():
     assert done.returncode == 0, done.stderr
 
 
+@pytest.mark.parametrize(("given", "taken"), [({}, "1"), ({"OPENBLAS_NUM_THREADS": "2"}, "2")])
+def test_linear_algebra_has_one_thread_unless_the_environment_says_otherwise(given, taken):
+    """OpenBLAS reads its variable when numpy is imported; `--help` ends in SystemExit."""
+    code = (
+        "import contextlib, os, sys; from equimorph.cli import main; sys.argv = ['', '--help']\n"
+        "assert 'numpy' not in sys.modules\n"
+        "with contextlib.suppress(SystemExit): main()\n"
+        "print(os.environ['OPENBLAS_NUM_THREADS'])"
+    )
+    known = {name: value for name, value in os.environ.items() if "OPENBLAS" not in name}
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, env=known | given
+    )
+    assert done.stdout.split()[-1] == taken
+
+
 def test_help_answers_within_half_a_second():
     """Time of the processor, so that a busy machine does not fail it."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)

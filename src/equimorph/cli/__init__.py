@@ -1,10 +1,15 @@
 """The command line."""
 
+import os
 import sys
 
 
 def main() -> None:
-    """Run the command line; Ctrl-C while its modules are imported is one line, too."""
+    """Run the command line; Ctrl-C while its modules are imported is one line, too.
+
+    OpenBLAS has one thread unless the environment says otherwise: our kernels have their own.
+    """
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
         from equimorph.cli.app import main as run
     except KeyboardInterrupt:
