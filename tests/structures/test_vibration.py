@@ -216,6 +216,21 @@ def test_states_of_orbits_vibrate_as_those_of_slightly_unequal_stiffness():
     np.testing.assert_allclose(pinned.natural_frequencies(5), free, rtol=1e-9)
 
 
+def test_many_frequencies_that_are_nearly_equal_are_told_apart():
+    """Ten cantilevers at one clamp, stiffnesses 0.2 % apart. 1e-8: one element of degree 6."""
+    joints, members, stiff = {"O": (0.0, 0.0)}, [], []
+    for k in range(10):
+        joints[f"T{k}"] = (np.cos(0.2 * np.pi * k), np.sin(0.2 * np.pi * k))
+        stiff.append(1.0 + 0.002 * ((7 * k) % 10))
+        members.append(em.Member(("O", f"T{k}"), EI=stiff[-1], mass=1.0))
+    load = {"P": {"T0": (0.0, 1.0)}}
+    frame = em.Frame(joints, members, {"O": "fixed"}, load, elements=1, degree=6)
+    exact = CANTILEVER[0] ** 2 * np.sqrt(np.sort(stiff))
+    for count in (1, 2, 5):
+        found = frame.natural_state().natural_frequencies(count)
+        np.testing.assert_allclose(found, exact[:count], rtol=1e-8)
+
+
 def test_stiff_modes_beside_a_soft_one_are_finite():
     """ω₁ is 4000 times below ω₆ where stiffnesses differ by 1e-5; stiff modes hardly change."""
     found = []

@@ -18,6 +18,8 @@ GUARD = 4
 """Vectors beyond those asked for: subspace iteration converges by the ratio to the next one."""
 SWEEPS = 80
 """Most steps of subspace iteration."""
+CROWDED = 0.8
+"""Share of 1/ω² of the last mode asked for above which the last vector is too near to it."""
 RELATIVE = 1e-12
 """Relative change of all frequencies' squares that counts as none."""
 
@@ -38,8 +40,9 @@ def vibrations(structure: Structure, z: Lanes, p: Parameters, count: int) -> Vib
     """Lowest modes of stable states, by subspace iteration with the constrained Hessian.
 
     Each step solves with F_z and takes the best combinations (Rayleigh and Ritz) of all vectors.
-    Springs at supports that the unknowns leave free have coordinates of their own. States on orbits
-    vibrate across these, orthogonal to them in M: the turn along them is no vibration.
+    There are twice as many where all have frequencies near those asked for. Springs at supports
+    that the unknowns leave free have coordinates of their own. States on orbits vibrate across
+    these, orthogonal to them in M: the turn along them is no vibration.
 
     Raises
     ------
@@ -61,20 +64,14 @@ def vibrations(structure: Structure, z: Lanes, p: Parameters, count: int) -> Vib
     free = moving.coordinates - structure.constraints
     if not 1 <= count <= free:
         raise InputError(f"`count` must be from 1 to {free}, the free movements; got {count!r}.")
-    width = min(count + GUARD, moving.coordinates)
-    vectors = np.random.default_rng(0).normal(size=(len(z), width, moving.coordinates))
-    vectors = moving.across(vectors)
-    last = np.zeros((len(z), count))
-    for _ in range(SWEEPS):
-        forces = moving.inertia(vectors)
-        moved = moving.response(forces)
-        stiff = moved @ forces.transpose(0, 2, 1)
-        heavy = moved @ moving.inertia(moved).transpose(0, 2, 1)
-        inverse, vectors = _ritz(stiff, heavy, moved)
-        now = inverse[:, :count]
-        if (np.abs(now - last) <= RELATIVE * now).all():
-            break
-        last = now
+    generator, more = np.random.default_rng(0), min(count + GUARD, moving.coordinates)
+    vectors, crowded = np.zeros((len(z), 0, moving.coordinates)), True
+    while more and crowded:
+        added = generator.normal(size=(len(z), more, moving.coordinates))
+        vectors = np.concatenate([vectors, moving.across(added)], axis=1)
+        inverse, vectors = _lowest(moving, vectors, count)
+        crowded = bool((inverse[:, -1] > CROWDED * inverse[:, count - 1]).any())
+        more = min(vectors.shape[1], moving.coordinates - vectors.shape[1])
     size = np.sqrt(np.einsum("lki,lki->lk", vectors, moving.inertia(vectors)))
     with np.errstate(divide="ignore", invalid="ignore"):
         frequencies = 1.0 / np.sqrt(np.maximum(inverse[:, :count], 0.0))
@@ -128,6 +125,24 @@ class _Moving:
             return np.asarray(v - (v @ heavy.transpose(0, 2, 1)) @ share)
 
         return cls(count, inertia, response, across)
+
+
+def _lowest(
+    moving: _Moving, vectors: Float[np.ndarray, "lanes w n"], count: int
+) -> tuple[Float[np.ndarray, "lanes w"], Float[np.ndarray, "lanes w n"]]:
+    """Values 1/ω², descending, and modes to which steps from some vectors converge."""
+    last = np.zeros((len(vectors), count))
+    for _ in range(SWEEPS):
+        forces = moving.inertia(vectors)
+        moved = moving.response(forces)
+        stiff = moved @ forces.transpose(0, 2, 1)
+        heavy = moved @ moving.inertia(moved).transpose(0, 2, 1)
+        inverse, vectors = _ritz(stiff, heavy, moved)
+        now = inverse[:, :count]
+        if (np.abs(now - last) <= RELATIVE * now).all():
+            break
+        last = now
+    return inverse, vectors
 
 
 def _ritz(
