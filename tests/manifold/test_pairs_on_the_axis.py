@@ -90,3 +90,24 @@ def test_random_searches_find_the_states_of_the_set():
         ]
         assert set(told[0]) <= set(told[1])
         assert len(told[1]) in {1, 3}
+
+
+@pytest.mark.slow
+def test_straight_rods_with_whole_turns_more_are_found():
+    """Turns by 4π both ways are the same clamps: E = C τ²/(8π²) + the thrust's, C = 0.7.
+
+    They are unstable throughout, join no other states inside the box, and lie where random guesses
+    hardly lead: to the axis.
+    """
+    rod, _, _ = coaxial(elements=8, degree=5)
+    fixed = {"twist_A": 0.1, "twist_B": 0.6, "P": 0.0}
+    within = [rod.max_curvature <= 3.0]
+    eset = em.equilibrium_set(
+        rod, em.Box(nu=(0.8, 0.86)), fixed=fixed, within=within, intervals=(4,)
+    )
+    assert eset.audit.clean
+    energies = eset.at(nu=0.83).energy
+    for turns in (-1, 0, 1):
+        twist = 0.5 + 4.0 * np.pi * turns
+        straight = 0.7 * twist**2 / (8.0 * np.pi**2) + 0.5 * 6.0 * 0.17**2
+        assert np.abs(energies - straight).min() < 1e-8
