@@ -13,8 +13,8 @@ import numpy as np
 from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Bool, Flags, Float, Lanes, Parameters, Points, Some
 from equimorph.charts.location import Found
+from equimorph.charts.preference import shares_of_ends
 from equimorph.charts.rules import Choice, Identity, Rule, first_of_each, highest, lowest, nearest
-from equimorph.charts.score_changes import shares_of_ends
 from equimorph.columns import Columns
 from equimorph.equilibria import ParameterLine, TraceOptions
 from equimorph.equilibria.critical import Test

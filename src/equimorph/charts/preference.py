@@ -1,4 +1,4 @@
-"""The choice of a rule over points and at states."""
+"""The choice of a rule over points and at states, and where states tie with the best others."""
 
 from dataclasses import dataclass
 
@@ -10,15 +10,26 @@ from equimorph.arrays import (
     Lanes,
     Parameters,
     Points,
+    Some,
     Values,
 )
 from equimorph.charts.location import Cells, Found
-from equimorph.charts.rules import Choice
-from equimorph.charts.score_changes import changes_by_score
-from equimorph.structures import States, join_states
+from equimorph.charts.rules import Choice, Scoring
+from equimorph.columns import Columns
+from equimorph.equilibria import ParameterLine, TraceOptions
+from equimorph.equilibria.trace import Traces, trace
+from equimorph.equilibria.trace_options import EventCode
+from equimorph.manifold.lookup.exact_states import exact_states
+from equimorph.model import Constraint
+from equimorph.structures import States, Structure, join_states
 
 DIFFERENT = 1e-4
 """Distance in the metric from which on two states over a point are different ones."""
+ITERATIONS = 24
+"""Most steps of the regula falsi with halved values, whose order is 1.44."""
+LEAST_STEP = 1e-13
+"""Change of a share from which on it counts as exact."""
+ENDS = (EventCode.FOLD, EventCode.BRANCH_POINT, EventCode.CONSTRAINT)
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +78,7 @@ class Preference:
         if choice.score is None:
             return np.zeros((len(start), 0))
         both, _ = self._with_others(start.z, start.p)
-        return changes_by_score(choice.score, both, stop, constraints)
+        return _changes_by_score(choice.score, both, stop, constraints)
 
     def _with_others(
         self, z: Lanes, p: Parameters, found: Found | None = None
@@ -95,3 +106,99 @@ class Preference:
             np.concatenate([others.inside, np.ones(len(z), bool)]),
         )
         return both, points
+
+
+@dataclass(frozen=True)
+class _Moving(Columns):
+    """States at both ends of straight ways, their indices, and the cells where they start."""
+
+    first: Lanes
+    last: Lanes
+    index: Some
+    cell: Some
+
+    def at(self, structure: Structure, p: Parameters, share: Values) -> tuple[Lanes, Flags]:
+        """States between the ends, and which were found on the same sheets."""
+        guess = self.first + share[:, None] * (self.last - self.first)
+        z, found, index = exact_states(structure, guess, p)
+        return z, found & (index == self.index)
+
+
+@dataclass(frozen=True)
+class _Ways(Columns):
+    """Ways along which states and their best rivals move."""
+
+    start: Parameters
+    velocity: Parameters
+    own: _Moving
+    rival: _Moving
+
+    def lead(self, structure: Structure, score: Scoring, share: Values) -> Values:
+        """Scores of states less those of their rivals; not numbers where one was not found."""
+        p = self.start + share[:, None] * self.velocity
+        sides = [each.at(structure, p, share) for each in (self.own, self.rival)]
+        states = join_states(structure, [States(structure, z, p) for z, _ in sides])
+        cell, lanes = np.concatenate([self.own.cell, self.rival.cell]), np.arange(len(share))
+        found = Found(states, np.tile(lanes, 2), cell, np.ones(len(cell), bool))
+        own, rival = np.split(score(found), 2)
+        return np.where(sides[0][1] & sides[1][1], own - rival, np.nan)
+
+
+def _changes_by_score(
+    score: Scoring, found: Found, stop: States, constraints: tuple[Constraint, ...]
+) -> Float[np.ndarray, "lanes 2"]:
+    """Shares of straight ways at which states tie with their best rivals, and at which these end.
+
+    Not numbers where they do not. `found` are all states over the starts of the ways, and the
+    rivals are those there; `stop` are the states that move at the ends. Constraints end rivals.
+    """
+    structure, count = stop.structure, len(found.point) - len(stop)
+    out, value = np.full((len(stop), 2), np.nan), score(found)
+    order = np.lexsort((value[:count], found.point[:count]))
+    best = order[np.diff(found.point[order], prepend=-1) > 0]
+    lane = found.point[best]
+    own, rival = found.states[count:][lane], found.states[best]
+    velocity = stop.p[lane] - own.p
+    line = ParameterLine(structure, own.p.copy(), velocity)
+    out[lane, 1], ended = shares_of_ends(line, rival.z.copy(), constraints)
+    ways = _Ways(
+        own.p,
+        velocity,
+        _Moving(own.z, stop.z[lane], structure.index(own.z, own.p), found.cell[count + lane]),
+        _Moving(rival.z, ended.z, structure.index(rival.z, rival.p), found.cell[best]),
+    )
+    there = np.flatnonzero(ended.code == EventCode.ARRIVED)
+    out[lane[there], 0] = _ties(structure, score, ways.take(there))
+    return out
+
+
+def shares_of_ends(
+    ways: ParameterLine, z: Lanes, constraints: tuple[Constraint, ...]
+) -> tuple[Values, Traces]:
+    """Shares of ways at which states on them end, and how they do; not numbers where they do not.
+
+    States at the starts are `z`; besides folds and branch points constraints end them.
+    """
+    ended = trace(ways, z, constraints, TraceOptions(record=False))
+    return np.where(np.isin(ended.code, ENDS), ended.t, np.nan), ended
+
+
+def _ties(structure: Structure, score: Scoring, ways: _Ways) -> Values:
+    """Shares at which the lead of states over their rivals vanishes."""
+    count = len(ways.start)
+    out, lanes = np.full(count, np.nan), np.arange(count)
+    low, high = np.zeros(count), np.ones(count)
+    below, above = (ways.lead(structure, score, each) for each in (low, high))
+    for _ in range(ITERATIONS):
+        open_ = (below * above < 0.0) & (np.abs(high - low) > LEAST_STEP)
+        lanes, low, high, below, above = (each[open_] for each in (lanes, low, high, below, above))
+        if len(lanes) == 0:
+            break
+        share = (low * above - high * below) / (above - below)
+        out[lanes] = share
+        here = ways.take(lanes).lead(structure, score, share)
+        beyond = here * above < 0.0
+        low, below = np.where(beyond, high, low), np.where(beyond, above, 0.5 * below)
+        settled = np.abs(share - high) <= LEAST_STEP
+        high, above = share, np.where(settled, 0.0, here)
+    return out

@@ -6,9 +6,9 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from equimorph.arrays import Float, Int
-from equimorph.dynamics.chain_entries import PlanarChained
 from equimorph.dynamics.linkage import Bends, Linkage, Supports
 from equimorph.dynamics.mechanism import Vector
+from equimorph.dynamics.plant import PlanarChained
 from equimorph.errors import MissingError
 from equimorph.structures import Frame, State, States
 from equimorph.structures.frame.model import FrameModel

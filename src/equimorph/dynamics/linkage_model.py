@@ -6,11 +6,10 @@ import numpy as np
 
 from equimorph.arrays import Float
 from equimorph.dynamics.balance import Balance, Quasistatics, balance, follow
-from equimorph.dynamics.chain_entries import Chained
 from equimorph.dynamics.fold_delay import fold_delay
 from equimorph.dynamics.mechanism import Pulls, Settings, Vector
 from equimorph.dynamics.model import Course, Model, Motion, Plant, Points, Row
-from equimorph.dynamics.plant import Simulation
+from equimorph.dynamics.plant import Chained, Simulation
 from equimorph.structures import State, States
 
 ONE = np.ones(1)

@@ -10,9 +10,8 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from equimorph.arrays import Float, Int
-from equimorph.dynamics.chain_entries import Chained
 from equimorph.dynamics.mechanism import LIGHT, Settings, Vector
-from equimorph.dynamics.plant import Simulation
+from equimorph.dynamics.plant import Chained, Simulation
 from equimorph.dynamics.rods import (
     Function,
     between,

@@ -8,7 +8,7 @@ from equimorph.linalg.compiled import is_awaited
 from equimorph.marching import kernels
 from equimorph.model import Constraint
 from equimorph.structures import Advance
-from equimorph.structures.compiled_steps import CompiledSteps
+from equimorph.structures.contract import CompiledSteps
 
 Line = tuple[Parameters, Parameters]
 

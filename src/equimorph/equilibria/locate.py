@@ -25,7 +25,7 @@ from equimorph.marching import event_kernels as roots, kernels, tick_kernels as 
 from equimorph.marching.kernels import cubic_shares
 from equimorph.model import Constraint
 from equimorph.structures import Advance
-from equimorph.structures.compiled_steps import CompiledSteps
+from equimorph.structures.contract import CompiledSteps
 
 AT_ROUND_OFF = Guards(iterations=24, converged=1e-9)
 """A point is exact after a correction below 1e-9 in the metric: Newton squares the error."""

@@ -13,15 +13,14 @@ from equimorph.equilibria.compiled import Line, Workspace, compiled_steps
 from equimorph.equilibria.curves import Curve, squared_length
 from equimorph.equilibria.events import Events
 from equimorph.equilibria.locate import polish
-from equimorph.equilibria.rare_steps import RareSteps
-from equimorph.equilibria.rows import Rows
+from equimorph.equilibria.rare_steps import RareSteps, Rows
 from equimorph.equilibria.steps import Front
 from equimorph.equilibria.trace_options import TraceOptions
 from equimorph.errors import InputError
 from equimorph.marching import kernels, tick_kernels as ticks
 from equimorph.marching.kernels import ARRIVAL, CONVERGED, ENDED, RETURN, STARTING
 from equimorph.model import Constraint
-from equimorph.structures.compiled_steps import CompiledSteps
+from equimorph.structures.contract import CompiledSteps
 
 AT_GOAL, FROM_GOAL = 1e-9, 1e-6
 """Distance from an end of t, and of the states in the metric, from which Newton's method takes

@@ -1,6 +1,8 @@
 """The contract of structures: the methods by which the rest of the package uses them.
 
 Those that Newton's method needs are in `structures.equations`.
+
+`CompiledSteps` are what a structure offers whose paths are followed by loops compiled as a whole.
 """
 
 import json
@@ -27,10 +29,36 @@ from equimorph.model import (
     parameter_vector,
     remember_call,
 )
-from equimorph.structures.clearance import straight_arcs
-from equimorph.structures.compiled_steps import CompiledSteps
-from equimorph.structures.inertial import Inertial
+from equimorph.model.obstacle import straight_arcs
+from equimorph.structures.material_points import Inertial
 from equimorph.tables import html_table
+
+
+@dataclass(frozen=True)
+class CompiledSteps:
+    """Loops over the kernels of a structure: they follow straight lines in its parameters.
+
+    Their results are those of `Structure.advance` and of the constraints.
+
+    Parameters
+    ----------
+    march
+        `marching.tick_kernels.march_of`, made with the structure's step and values of constraints.
+    search
+        `marching.search_kernels.search_of`, made with the same.
+    tables
+        What these share among lanes.
+    bounds
+        The constraints, one a row, as the structure's kernel reads them.
+    guard
+        Least ratio of the pivots of a step; below it `Structure.advance` takes the step.
+    """
+
+    march: Callable[..., int]
+    search: Callable[..., int]
+    tables: tuple[tuple[np.ndarray, ...], ...]
+    bounds: Float[np.ndarray, "constraints 4"]
+    guard: float
 
 
 @dataclass(frozen=True)

@@ -14,9 +14,8 @@ from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Lanes, Parameters, Values
 from equimorph.errors import InputError
 from equimorph.model import Box, Descriptor, largest_of, position, remember_call
-from equimorph.model.obstacle import Disc, HalfPlane, Obstacle
+from equimorph.model.obstacle import Disc, HalfPlane, Obstacle, nearest
 from equimorph.model.units import FORCE, LENGTH, UNITS
-from equimorph.structures.clearance import nearest
 from equimorph.structures.contract import Structure
 from equimorph.structures.margin import stability_margin
 

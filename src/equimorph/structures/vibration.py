@@ -11,8 +11,7 @@ import numpy as np
 from equimorph.arrays import Float, Lanes, Parameters
 from equimorph.errors import InputError
 from equimorph.structures.contract import Structure
-from equimorph.structures.inertial import Product
-from equimorph.structures.material_points import SupportSprings
+from equimorph.structures.material_points import Product, SupportSprings
 
 GUARD = 4
 """Vectors beyond those asked for: subspace iteration converges by the ratio to the next one."""

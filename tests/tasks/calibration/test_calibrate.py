@@ -6,8 +6,7 @@ import pytest
 from equimorph.equilibria import lift
 from equimorph.errors import InputError
 from equimorph.structures import Bar, Rod, Spring, States, Truss
-from equimorph.tasks.calibration.branch import Branch
-from equimorph.tasks.calibration.calibrate import calibrate
+from equimorph.tasks.calibration.calibrate import Branch, calibrate
 from equimorph.tasks.calibration.measurements import MeasuredShape, MeasuredValues
 from equimorph.tasks.calibration.unknowns import unknowns
 from typecheck import unchecked

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import equimorph as em
-from equimorph.tasks.calibration.branch import Branch
+from equimorph.tasks.calibration.calibrate import Branch
 from equimorph.tasks.calibration.unknowns import unknowns
 from typecheck import unchecked
 

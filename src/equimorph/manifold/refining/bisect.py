@@ -18,9 +18,9 @@ from equimorph.equilibria.locus import Locus, Spots, nearest
 from equimorph.equilibria.locus_events import Walks
 from equimorph.equilibria.trace_locus import begin, passes, step, update
 from equimorph.equilibria.trace_options import TraceOptions
+from equimorph.manifold.complex.cuts import copies, duplicates, first_copies, with_copies
 from equimorph.manifold.complex.edge_points import Places, chunks, on_all_edges, unmet
 from equimorph.manifold.complex.marked_complex import CURVES, Fabric, FacetMark
-from equimorph.manifold.complex.shared_edges import copies, duplicates, first_copies, with_copies
 from equimorph.manifold.complex.vertices import Vertices, gather, vertices_of
 from equimorph.manifold.geometry.points import CAP, CROSSING, FOLD
 from equimorph.manifold.geometry.topology import count_corners, keys_of

@@ -11,6 +11,7 @@ from itertools import combinations, product
 import numpy as np
 
 from equimorph.arrays import Bool, Edges, Float, Int, ItemFlags, Places, VertexFlags
+from equimorph.manifold.complex.cuts import copies
 from equimorph.manifold.complex.edge_points import chunks, of_index, on_curves, vertices_at
 from equimorph.manifold.complex.marked_complex import (
     TRIANGLES,
@@ -19,7 +20,6 @@ from equimorph.manifold.complex.marked_complex import (
     edges_of,
     held_parameters,
 )
-from equimorph.manifold.complex.shared_edges import copies
 from equimorph.manifold.complex.vertices import Vertices
 from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.geometry.simplices import squared_sides

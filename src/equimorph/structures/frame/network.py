@@ -13,8 +13,7 @@ from equimorph.argument_kinds import one_of
 from equimorph.argument_notes import TWO_NAMES, positive_quantity
 from equimorph.arrays import Bool, Float
 from equimorph.errors import InputError
-from equimorph.structures.frame.any_network import PRESSURE, WEIGHT, AnyFrameNetwork
-from equimorph.structures.frame.member import AnyMember
+from equimorph.structures.frame.any_network import PRESSURE, WEIGHT, AnyFrameNetwork, AnyMember
 from equimorph.structures.network import (
     Joints,
     check_hinges,

@@ -14,7 +14,7 @@ from equimorph.errors import InputError
 from equimorph.linalg import BorderedSolution
 from equimorph.linalg.intervals import Interval
 from equimorph.model import Constraint, Descriptor, remember_call
-from equimorph.structures.clearance import smooth_arcs
+from equimorph.model.obstacle import smooth_arcs
 from equimorph.structures.contract import Readers, Symmetry, Written
 from equimorph.structures.equations import (
     Advance,

@@ -1,15 +1,19 @@
-"""PlanarMechanics of the clamped rod: energy, residual, derivatives and solves in batches."""
+"""PlanarMechanics of the clamped rod: energy, residual, derivatives and solves in batches.
 
+Fields are recovered to the accuracy that they have at vertices.
+"""
+
+from dataclasses import dataclass
 from functools import cached_property, partial
 
 import numpy as np
+from numpy.polynomial import legendre, polynomial
 
 from equimorph.arrays import Float, Lanes, Nodal, Parameters, Sides, Values, Velocity
 from equimorph.linalg import BorderedSolution, CondensedLayout, multiply, no_border
 from equimorph.linalg.condensed import PIVOT_GUARD
 from equimorph.linalg.lanes import over_lanes
-from equimorph.structures.compiled_steps import CompiledSteps
-from equimorph.structures.contract import Symmetry
+from equimorph.structures.contract import CompiledSteps, Symmetry
 from equimorph.structures.equations import Advance, AnyBorder, Direction, LinearSystem, Shift
 from equimorph.structures.rod.clamped_derivative_kernels import (
     linearise_lanes,
@@ -18,10 +22,10 @@ from equimorph.structures.rod.clamped_derivative_kernels import (
     residual_lanes,
     second_lanes,
 )
-from equimorph.structures.rod.clamped_fields import ClampedFields
+from equimorph.structures.rod.clamped_field_kernels import fields_lanes, largest_lanes
 from equimorph.structures.rod.clamped_kernels import advance_lanes
 from equimorph.structures.rod.clamped_march_kernels import march_lanes, search_lanes
-from equimorph.structures.rod.discretisation import Mesh
+from equimorph.structures.rod.discretisation import Mesh, reference_element
 from equimorph.structures.rod.inertia import inextensible_force, inextensible_inertia
 from equimorph.structures.rod.mechanics import Bounds, PlanarMechanics
 from equimorph.structures.rod.planar_energy import PlanarEnergy
@@ -30,6 +34,10 @@ from equimorph.structures.rod.units import FOUR_PI_SQUARED
 
 PARAMETERS = 4
 """Number of parameters: Θ, Δ, q, ν."""
+LOAD_DEGREE = 16
+"""Degree of the polynomials by which the load is represented inside an element."""
+NEGLIGIBLE = 1e-13
+"""Legendre coefficients of ρ that are smaller, relative to the largest |ρ|, are round-off."""
 
 
 class ClampedMechanics(PlanarMechanics):
@@ -245,3 +253,97 @@ class ClampedMechanics(PlanarMechanics):
         image[:, :n] = -z[:, :n][:, ::-1]
         image[:, -1] = p[:, 2] * total - z[:, -1]
         return image, p * np.array([1.0, -1.0, 1.0, 1.0])
+
+
+@dataclass(frozen=True, eq=False)
+class ClampedFields:
+    """Fields anywhere on the rod as accurate as at its vertices: errors of order 2N for degree N.
+
+    θ and the moments are superconvergent at the vertices, λ and μ everywhere; inside an element θ
+    of degree N is less accurate. So the equilibrium equation is integrated from the nearest vertex,
+    as an initial value problem, by Taylor series of order 16.
+
+    References
+    ----------
+    Vertices: [DouglasDupont1974]_.
+    """
+
+    mesh: Mesh
+    load: LoadShape
+    stiffness: Float[np.ndarray, "elements order order"]
+    """Element stiffness over 4π²."""
+    rho: Float[np.ndarray, "elements order"]
+
+    def fields(
+        self, z: Lanes, p: Parameters, s: Float[np.ndarray, " points"]
+    ) -> Float[np.ndarray, "lanes points 4"]:
+        """(θ, κ, x, y) at arclengths."""
+        element, t = self.mesh.locate(s)
+        side = (t > 0.5).astype(np.int64)
+        distance = s - self.mesh.breaks[element + side]
+        out = np.empty((len(z), 4 * len(s)))
+        shared = (
+            self.stiffness,
+            self._pressures,
+            self.mesh.element_weights,
+            self._nodal_rho,
+            self._rises,
+            element,
+            side,
+            distance,
+        )
+        over_lanes(fields_lanes, shared, [z, p], [out])
+        return out.reshape(len(z), len(s), 4)
+
+    def largest_curvature(self, z: Lanes, p: Parameters) -> tuple[Values, Values]:
+        """max_s |κ(s)|, ends and interior extrema included, and the first arclength where it is."""
+        out, place = np.empty(len(z)), np.empty(len(z))
+        over_lanes(largest_lanes, self.extremum_data, [z, p], [out, place])
+        return out, place
+
+    @cached_property
+    def extremum_data(self) -> tuple[np.ndarray, ...]:
+        """What the search for the largest curvature shares among lanes."""
+        ref = self.mesh.reference
+        return (
+            self.stiffness,
+            self._pressures,
+            self.mesh.breaks,
+            ref.nodes,
+            ref.integral,
+            self._nodal_rho,
+            self._rises,
+        )
+
+    @cached_property
+    def _pressures(self) -> Float[np.ndarray, " elements"]:
+        """Quadrature weight of a vertex in each element."""
+        return np.ascontiguousarray(self.mesh.element_weights[:, 0])
+
+    @cached_property
+    def _nodal_rho(self) -> Float[np.ndarray, " nodes"]:
+        """ρ, which is continuous, node by node."""
+        return np.append(self.rho[:, :-1].ravel(), self.rho[-1, -1])
+
+    @cached_property
+    def _rises(self) -> Float[np.ndarray, "elements 2 terms"]:
+        """Taylor coefficients of ρ about the left and the right vertex of each element.
+
+        ρ is taken as a polynomial of degree 16 in each element, less its round-off: of degree 2
+        under tables.
+        """
+        fine = Mesh(self.mesh.breaks, reference_element(LOAD_DEGREE))
+        rho = self.load.cumulate(fine)
+        series = rho @ fine.reference.to_legendre.T
+        large = np.abs(series).max(axis=0) > NEGLIGIBLE * max(np.abs(rho).max(), 1e-300)
+        terms = int(np.flatnonzero(large).max(initial=0)) + 1
+        out = np.empty((self.mesh.elements, 2, terms))
+        for e, length in enumerate(self.mesh.lengths):
+            powers = legendre.leg2poly(series[e, :terms])  # in x = −1 … 1
+            for side, centre in enumerate((-1.0, 1.0)):
+                scale = 1.0
+                for k in range(terms):
+                    at = polynomial.polyval(centre, polynomial.polyder(powers, k))
+                    out[e, side, k] = at * scale
+                    scale *= 2.0 / (length * (k + 1))
+        return out

@@ -12,8 +12,7 @@ from equimorph.arrays import Int, Lanes, Parameters, Values
 from equimorph.errors import InputError, MissingError
 from equimorph.model import Constraint, Descriptor, remember_call
 from equimorph.model.descriptor import Branches
-from equimorph.structures.compiled_steps import CompiledSteps
-from equimorph.structures.contract import Readers, Written
+from equimorph.structures.contract import CompiledSteps, Readers, Written
 from equimorph.structures.rod import space
 from equimorph.structures.rod.any_rod import Field, Peaks
 from equimorph.structures.rod.ends import End

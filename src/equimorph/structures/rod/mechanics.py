@@ -12,8 +12,7 @@ from equimorph.linalg import multiply
 from equimorph.linalg.condensed import PIVOT_GUARD
 from equimorph.linalg.intervals import Interval
 from equimorph.linalg.lanes import over_lanes
-from equimorph.structures.compiled_steps import CompiledSteps
-from equimorph.structures.contract import Symmetry
+from equimorph.structures.contract import CompiledSteps, Symmetry
 from equimorph.structures.equations import Advance, Direction, Enclosed, Equations
 from equimorph.structures.material_points import MaterialPoints
 from equimorph.structures.rod.discretisation import Mesh, error_by_refinement

@@ -16,7 +16,7 @@ from equimorph.argument_notes import (
 )
 from equimorph.arrays import Float
 from equimorph.errors import InputError
-from equimorph.structures.frame.member import AnyMember
+from equimorph.structures.frame.any_network import AnyMember
 from equimorph.structures.network import check_hinges
 from equimorph.structures.rod.sections import CrossSection, SectionProperties
 from equimorph.structures.unit_system import Quantity, UnitSystem

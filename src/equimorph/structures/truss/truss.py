@@ -14,7 +14,7 @@ from equimorph.model import Descriptor, remember_call
 from equimorph.structures.collapse import Shortening
 from equimorph.structures.contract import Symmetry
 from equimorph.structures.discrete import correct_at_parameters
-from equimorph.structures.inertial import Product
+from equimorph.structures.material_points import Product
 from equimorph.structures.network import Joints, check_parameter_names, direction_of_mechanism
 from equimorph.structures.truss.mechanics import BarValues, TrussMechanics, symmetries
 from equimorph.structures.truss.network import (
