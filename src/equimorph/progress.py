@@ -5,7 +5,7 @@ import time
 from html import escape
 from importlib import import_module
 from types import TracebackType
-from typing import Any
+from typing import Any, NamedTuple
 
 from rich.console import Console
 from rich.progress import (
@@ -20,6 +20,13 @@ from rich.progress import (
 
 EVERY = 0.2
 """Seconds between two pictures in a notebook."""
+
+
+class Reached(NamedTuple):
+    """How far a stage is; `total` is None where it is not known."""
+
+    done: int
+    total: int | None
 
 
 class ProgressBars:
@@ -40,7 +47,7 @@ class ProgressBars:
 
     def __init__(self) -> None:
         self._drawn: _Screen | _Cell = _Cell() if in_notebook() else _Screen()
-        self._reached: dict[str, tuple[int, int | None]] = {}
+        self._reached: dict[str, Reached] = {}
         self._current: str | None = None
 
     def __enter__(self) -> "ProgressBars":
@@ -65,11 +72,11 @@ class ProgressBars:
             self._move(before, end, end)
         self._current = stage
         # A stage may find more to do than it first said, or only know in the end.
-        known = self._reached.get(stage, (0, None))[1] if total is None else total
+        known = self._reached.get(stage, Reached(0, None)).total if total is None else total
         self._move(stage, done, None if known is None else max(known, done))
 
     def _move(self, stage: str, done: int, total: int | None) -> None:
-        self._reached[stage] = done, total
+        self._reached[stage] = Reached(done, total)
         self._drawn.show(self._reached, stage)
 
 
@@ -87,7 +94,7 @@ class _Screen:
         )
         self._tasks: dict[str, TaskID] = {}
 
-    def show(self, reached: dict[str, tuple[int, int | None]], stage: str) -> None:
+    def show(self, reached: dict[str, Reached], stage: str) -> None:
         """Move the bar of a stage."""
         done, total = reached[stage]
         if stage not in self._tasks:
@@ -109,7 +116,7 @@ class _Cell:
         self._handle: Any = None
         self._html, self._shown, self._time = "", "", 0.0
 
-    def show(self, reached: dict[str, tuple[int, int | None]], stage: str) -> None:
+    def show(self, reached: dict[str, Reached], stage: str) -> None:
         """Draw all bars, not too often."""
         del stage
         self._html = table_of(reached)
@@ -131,10 +138,10 @@ class _Cell:
             self._handle.update(picture)
 
 
-def table_of(reached: dict[str, tuple[int, int | None]]) -> str:
+def table_of(reached: dict[str, Reached]) -> str:
     """Return a table in HTML: a row a stage, with its bar and numbers.
 
-    >>> print(table_of({"seeds": (1, 2)}).replace("<td>", " "))
+    >>> print(table_of({"seeds": Reached(1, 2)}).replace("<td>", " "))
     <table><tr> seeds</td> <progress value="1" max="2"></progress></td> 1/2</td></tr></table>
     """
     rows = [

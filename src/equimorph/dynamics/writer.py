@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -26,6 +27,20 @@ class Spring:
     stiffness: float
     rest: Float[np.ndarray, " settings"]
     held: Float[np.ndarray, " settings"]
+
+
+class Hinge(NamedTuple):
+    """An elastic joint that is the hinge of a body."""
+
+    stiffness: float
+    rests: Rests
+
+
+class Tendon(NamedTuple):
+    """An elastic joint that a tendon replaces: its angle in turns of the bodies, and its spring."""
+
+    row: np.ndarray
+    spring: Spring
 
 
 def document(step: float, world: str, tendons: str, closed: str) -> str:
@@ -154,12 +169,12 @@ class Writer:
 
     # --- elastic joints -------------------------------------------------------------------------
 
-    def _bends(self) -> tuple[dict[int, tuple[float, Rests]], list[tuple[np.ndarray, Spring]]]:
+    def _bends(self) -> tuple[dict[int, Hinge], list[Tendon]]:
         """Elastic joints that are hinges of bodies, and those that tendons replace."""
         tree, linkage = self.tree, self.linkage
         body_of = {int(entry): k for k, entry in enumerate(tree.entries) if entry >= 0}
-        hinges: dict[int, tuple[float, Rests]] = {}
-        tendons: list[tuple[np.ndarray, Spring]] = []
+        hinges: dict[int, Hinge] = {}
+        tendons: list[Tendon] = []
         bends = linkage.bends
         for i, j, stiff, rest in zip(
             bends.plus.tolist(), bends.minus.tolist(), bends.stiffness.tolist(), bends.rest,
@@ -188,20 +203,20 @@ class Writer:
         sides: list[int],
         stiffness: float,
         rests: Rests,
-        hinges: dict[int, tuple[float, Rests]],
-        tendons: list[tuple[np.ndarray, Spring]],
+        hinges: dict[int, Hinge],
+        tendons: list[Tendon],
     ) -> None:
         first, second = sides
         bodies, above = self.tree.bodies, self.tree.above
         if first != WORLD and bodies[first].parent == second and first not in hinges:
-            hinges[first] = (stiffness, rests)
+            hinges[first] = Hinge(stiffness, rests)
         elif second != WORLD and bodies[second].parent == first and second not in hinges:
-            hinges[second] = (stiffness, -rests)
+            hinges[second] = Hinge(stiffness, -rests)
         else:
             nothing = np.zeros(len(bodies))
             row = above[first] if first != WORLD else nothing
             row = row - (above[second] if second != WORLD else nothing)
-            tendons.append((row, Spring(len(tendons), stiffness, *rests)))
+            tendons.append(Tendon(row, Spring(len(tendons), stiffness, *rests)))
 
     def _tendons(self) -> str:
         out = []

@@ -165,7 +165,7 @@ def look_inside(
         known = (piece.first - piece.low.length) / piece.width
         middle, good = _between(curve, piece, np.where(np.isnan(known), share, known))
         if not good.all():
-            found.append(_events(piece.take(~good), EventCode.BRANCH_POINT, located=False))
+            found.append(_doubtful(piece.take(~good)))
             piece = piece.take(good)
         parted = (np.abs(middle.value) > piece.zero) & (middle.front.index != piece.start.index)
         if parted.any():
@@ -173,7 +173,7 @@ def look_inside(
             piece, middle = piece.take(~parted), middle.take(~parted)
         middle = _upright(middle, piece.sign, piece.zero)
         piece = piece.divided(middle, _surprise(curve, piece, middle))
-    found.append(_events(piece, EventCode.BRANCH_POINT, located=False))
+    found.append(_doubtful(piece))
     return Events.join(found, curve.metric.size)
 
 
@@ -220,14 +220,17 @@ def _between(curve: Curve, piece: _Piece, share: Values) -> tuple[Probe, Flags]:
     return probe_at(curve.take(piece.lane[good]), front.take(good), length[good]), good
 
 
-def _events(
-    piece: _Piece, code: int | Numbers, located: bool, place: tuple[Lanes, Values] | None = None
-) -> Events:
-    """Events that leave the index as it is, at the low ends of pieces or elsewhere in them."""
-    z, t = place or (piece.low.front.z, piece.low.front.t)
+def _events(piece: _Piece, code: int | Numbers, z: Lanes, t: Values, *, located: bool) -> Events:
+    """Events inside pieces that leave the index as it is."""
     index = np.stack([piece.low.front.index] * 2, 1)
     kind, sure = np.full(len(t), code), np.full(len(t), located)
     return Events(piece.lane, kind, z, t, piece.low.length, index, sure)
+
+
+def _doubtful(piece: _Piece) -> Events:
+    """Branch points that are not located, at the low ends of pieces."""
+    low = piece.low.front
+    return _events(piece, EventCode.BRANCH_POINT, low.z, low.t, located=False)
 
 
 def _chord(curve: Curve, piece: _Piece) -> Values:
@@ -260,7 +263,7 @@ def _at_the_least(curve: Curve, piece: _Piece, options: TraceOptions) -> Events:
     alone = replace(piece, low=low).take(~parted)
     turns = _turns(curve.take(alone.lane), z, t)
     code = np.where(turns, EventCode.FOLD, EventCode.BRANCH_POINT)
-    touching = _events(alone, code, located=True, place=(z, t))
+    touching = _events(alone, code, z, t, located=True)
     return Events.join([both, touching], curve.metric.size)
 
 

@@ -238,7 +238,11 @@ def root_inside(
 
 
 class _Search:
-    """All lanes of one search, each in an independent iteration."""
+    """All lanes of one search, each in an independent iteration.
+
+    This is no corrector by itself: while trial points are on their way onto the curve, by the steps
+    of the march, the search chooses where along it they are tried.
+    """
 
     def __init__(
         self, curve: Curve, bracket: Bracket, ends: tuple[Values, Values], guess: Values

@@ -310,10 +310,10 @@ def free_directions(structure: Structure, free: Int[np.ndarray, "*_ k"], lanes: 
 
 
 def distances(
-    structure: Equations, here: tuple[Lanes, Parameters], there: tuple[Lanes, Parameters]
+    structure: Equations, z: Lanes, p: Parameters, other_z: Lanes, other_p: Parameters
 ) -> Values:
     """Distances of points in the metric and in the scaled parameters."""
-    (z, p), (other_z, other_p), n = here, there, structure.unknowns
+    n = structure.unknowns
     squared = (z[:, :n] - other_z[:, :n]) ** 2 @ structure.mass
     squared += (((p - other_p) / structure.scales) ** 2).sum(axis=1)
     return np.asarray(np.sqrt(squared))

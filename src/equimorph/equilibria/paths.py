@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -154,6 +155,13 @@ def lift_legs(states: States, within: tuple[Constraint, ...], options: TraceOpti
     return _join(states[0], [_segment(curve, outcome, lane, within, lane) for lane in lanes])
 
 
+class Passed(NamedTuple):
+    """An event that does not stop a path, and the length of the path up to it."""
+
+    length: float
+    event: Event
+
+
 @dataclass(frozen=True)
 class _Segment:
     """One leg of a path, without its first point."""
@@ -168,7 +176,7 @@ class _Segment:
 
 def _segment(
     curve: Curve, outcome: Traces, number: int, within: tuple[Constraint, ...], lane: int = 0,
-    aside: Sequence[tuple[float, Event]] = ()
+    aside: Sequence[Passed] = ()
 ) -> _Segment:  # fmt: skip
     """One lane of an outcome, as leg number so much of a path.
 
@@ -228,7 +236,7 @@ def _events_passed(curve: Curve, outcome: Traces, number: int) -> list[Event]:
     ]
 
 
-def _vanishing_events(curve: Curve, z: Lanes, outcome: Traces) -> list[tuple[float, Event]]:
+def _vanishing_events(curve: Curve, z: Lanes, outcome: Traces) -> list[Passed]:
     """Events of the only lane that do not stop it: where descriptors that are watched vanish."""
     found = []
     for descriptor in curve.structure.watched:
@@ -239,7 +247,7 @@ def _vanishing_events(curve: Curve, z: Lanes, outcome: Traces) -> list[tuple[flo
         for i, length in enumerate(at.travelled):
             state = State(curve.structure, states[0][i], states[1][i])
             kind = descriptor.vanishing.event
-            found.append((float(length), Event(kind, state, float(at.t[i]), critical[i])))
+            found.append(Passed(float(length), Event(kind, state, float(at.t[i]), critical[i])))
     return found
 
 

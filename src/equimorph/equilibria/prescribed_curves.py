@@ -272,7 +272,7 @@ class TrackedCurve:
         residual = structure.residual(x, p)
         solved = _tangent_space(structure, x, p, residual, changes)
         onto, along = solved.x[:, 0], solved.x[:, 1:]
-        linear = self._linear((x, p), given[:, many:], slope[:, many:], solved.x, changes)
+        linear = self._linear(x, p, given[:, many:], slope[:, many:], solved.x, changes)
         closing = self._closing(solved.x, row, corner)
         matrix = np.concatenate([linear.slopes, closing[:, None, 1:]], axis=1)
         rhs = np.zeros((len(z), 2, k + 1))
@@ -292,7 +292,8 @@ class TrackedCurve:
 
     def _linear(
         self,
-        states: tuple[Lanes, Parameters],
+        z: Lanes,
+        p: Parameters,
         targets: Float[np.ndarray, "lanes k"],
         slope: Float[np.ndarray, "lanes k"],
         moves: Float[np.ndarray, "lanes moves bordered"],
@@ -302,7 +303,7 @@ class TrackedCurve:
 
         targets, slope: S* and its rate.
         """
-        structure, size, (z, p) = self.structure, self.structure.size, states
+        structure, size = self.structure, self.structure.size
         dz, dp = moves[:, :, :size], moves[:, :, size:] @ changes
         functions = tuple(descriptor.function for descriptor in self.descriptors)
         takes = DescriptorValues(functions, targets, METRIC_DIFFERENCE)

@@ -185,14 +185,14 @@ def settle(
     """
     guards = Guards() if guards is None else guards
     if directions is None and not conditions and guards.known is None:
-        return _apply_guards(structure, _at_parameters(structure, z, p, guards), (z, p), guards)
+        return _apply_guards(structure, _at_parameters(structure, z, p, guards), z, p, guards)
     frame = Tangents() if frame is None else frame
     if directions is None:
         directions = np.zeros((len(z), 0, p.shape[1]))
     problem = Problem(structure, directions, tuple(conditions), frame)
     if problem.in_one_plane and guards.known is None:
-        return _apply_guards(structure, _in_one_plane(problem, z, p, guards), (z, p), guards)
-    return _apply_guards(structure, _by_steps(problem, z, p, guards, frames=frames), (z, p), guards)
+        return _apply_guards(structure, _in_one_plane(problem, z, p, guards), z, p, guards)
+    return _apply_guards(structure, _by_steps(problem, z, p, guards, frames=frames), z, p, guards)
 
 
 def _at_parameters(structure: Equations, z: Lanes, p: Parameters, guards: Guards) -> Settled:
@@ -324,7 +324,7 @@ def _lengthening(
 
 
 def _apply_guards(
-    structure: Equations, settled: Settled, start: tuple[Lanes, Parameters], guards: Guards
+    structure: Equations, settled: Settled, start_z: Lanes, start_p: Parameters, guards: Guards
 ) -> Settled:
     """The points, those that are not believed marked in place."""
     z, p, status, index = settled.z, settled.p, settled.status, settled.index
@@ -337,8 +337,8 @@ def _apply_guards(
         status[(status == FOUND) & bad] = why
 
     if guards.trust is not None:
-        middle = start if guards.middle is None else guards.middle
-        refuse(~(distances(structure, (z, p), middle) <= guards.trust), Status.FAR)
+        middle = (start_z, start_p) if guards.middle is None else guards.middle
+        refuse(~(distances(structure, z, p, *middle) <= guards.trust), Status.FAR)
     if guards.index is not None:
         refuse(index != guards.index, Status.WRONG_INDEX)
     if guards.lower_index is not None:

@@ -118,7 +118,8 @@ class Drawing:
 
 
 def supports_of_point(
-    held: tuple[Float[np.ndarray, "held space"], Float[np.ndarray, " held"]],
+    directions: Float[np.ndarray, "held space"],
+    stiffness: Float[np.ndarray, " held"],
     turning: float,
     places: Spots,
     inward: Spots,
@@ -127,9 +128,10 @@ def supports_of_point(
 
     Parameters
     ----------
-    held
-        Orthonormal directions along which the point is held, and its stiffness along these: ∞ where
-        held firmly, 0 where free.
+    directions
+        Orthonormal directions along which the point is held.
+    stiffness
+        Its stiffness along these: ∞ where held firmly, 0 where free.
     turning
         Stiffness against turning: ∞ where held, 0 where free.
     places
@@ -137,7 +139,6 @@ def supports_of_point(
     inward
         Unit vectors that point into the structure, for a clamp.
     """
-    directions, stiffness = held
     firm, fixed, found = directions[np.isinf(stiffness)], bool(np.isinf(turning)), []
 
     def add(kind: SupportKind, direction: Float[np.ndarray, "..."]) -> None:

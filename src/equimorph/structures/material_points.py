@@ -22,6 +22,14 @@ INERTIA_DIFFERENCE = 1e-5
 """Step of the unknowns in differences of the mass matrix."""
 
 
+class SupportSpring(NamedTuple):
+    """One of them: its stiffness, gaps that it opens, and moves of the points."""
+
+    stiffness: float
+    gaps: np.ndarray
+    moves: np.ndarray
+
+
 @dataclass(frozen=True)
 class SupportSprings:
     """Springs against movements of supports along x, y or z, whose places s statics eliminates.
@@ -35,14 +43,12 @@ class SupportSprings:
     moves: Float[np.ndarray, "springs points_or_1 space"]
 
     @classmethod
-    def of(
-        cls, springs: Sequence[tuple[float, np.ndarray, np.ndarray]], constraints: int, space: int
-    ) -> "SupportSprings":
+    def of(cls, springs: Sequence[SupportSpring], constraints: int, space: int) -> "SupportSprings":
         """Of the stiffness, the gaps and the moves of each, of which there may be none."""
-        points = len(springs[0][2]) if springs else 1
-        stiffness = np.array([each[0] for each in springs])
-        gaps = np.array([each[1] for each in springs]).reshape(len(springs), constraints).T
-        moves = np.array([each[2] for each in springs]).reshape(len(springs), points, space)
+        points = len(springs[0].moves) if springs else 1
+        stiffness = np.array([each.stiffness for each in springs])
+        gaps = np.array([each.gaps for each in springs]).reshape(len(springs), constraints).T
+        moves = np.array([each.moves for each in springs]).reshape(len(springs), points, space)
         return cls(stiffness, gaps, moves)
 
     @property

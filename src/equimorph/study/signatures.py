@@ -11,7 +11,7 @@ import inspect
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass
 from types import NoneType, UnionType
-from typing import Annotated, Any, Literal, Union, get_args, get_origin
+from typing import Annotated, Any, Literal, NamedTuple, Union, get_args, get_origin
 
 from pydantic import Field
 
@@ -139,6 +139,15 @@ class Form:
 
 PLAIN = (bool, int, float)
 Make = Callable[..., Argument]
+
+
+class Made(NamedTuple):
+    """How an argument is made, and what is written for it."""
+
+    make: Make
+    written: Any
+
+
 SORTS: tuple[tuple[Callable[[Form], bool], Make, Any], ...] = (
     (lambda form: form.is_any(State, States), given.StateArgument, StateSection),
     (lambda form: form.is_any(Schedule), composite.WayArgument, None),
@@ -161,9 +170,9 @@ SORTS: tuple[tuple[Callable[[Form], bool], Make, Any], ...] = (
     (lambda form: form.is_any(str), given.ParametersArgument, str),
 )
 """Which class of arguments stands for which types, the first that fits, and how it is written."""
-ELSEWHERE: Mapping[Any, tuple[Make, Any]] = {
-    composite.GridArgument: (composite.ActuatorGridArgument, None),
-    given.WayPointsArgument: (given.PointsArgument, list[Step]),
+ELSEWHERE: Mapping[Any, Made] = {
+    composite.GridArgument: Made(composite.ActuatorGridArgument, None),
+    given.WayPointsArgument: Made(given.PointsArgument, list[Step]),
 }
 """What stands for them in tasks that do not take the set."""
 
@@ -187,13 +196,13 @@ def arguments_of(
     """
     parameters = inspect.signature(task).parameters
     forms = {name: Form(name, alternatives(each.annotation)) for name, each in parameters.items()}
-    other: dict[Any, tuple[Make, Any]] = {}
+    other: dict[Any, Made] = {}
     if not any(form.is_any(EquilibriumSet) for form in forms.values()):
         other |= ELSEWHERE
     if any(form.is_any(Schedule) for form in forms.values()):
-        other |= {given.StateArgument: (composite.WayStartArgument, StateSection)}
+        other |= {given.StateArgument: Made(composite.WayStartArgument, StateSection)}
     if natural:
-        other |= {given.StateArgument: (given.NaturalArgument, NaturalSection)}
+        other |= {given.StateArgument: Made(given.NaturalArgument, NaturalSection)}
     found = []
     for name, form in forms.items():
         if name == MONITOR or name in left_out or form.is_any(*SUPPLIED):
@@ -209,9 +218,7 @@ def arguments_of(
     return found
 
 
-def _argument(
-    form: Form, key: str, default: Any, other: Mapping[Any, tuple[Make, Any]]
-) -> Argument | None:
+def _argument(form: Form, key: str, default: Any, other: Mapping[Any, Made]) -> Argument | None:
     """Return the argument of a form; None where a study cannot write it."""
     for fits, make, written in SORTS:
         if fits(form):

@@ -15,8 +15,8 @@ def distance(a: State, b: State) -> float:
 
 def step_lengths(states: States) -> Float[np.ndarray, " steps"]:
     """Distances of successive states in the metric and scaled parameters."""
-    ahead, behind = (states.z[1:], states.p[1:]), (states.z[:-1], states.p[:-1])
-    return distances(states.structure, ahead, behind)
+    ahead, behind = states[1:], states[:-1]
+    return distances(states.structure, ahead.z, ahead.p, behind.z, behind.p)
 
 
 def path_lengths(states: States) -> Values:

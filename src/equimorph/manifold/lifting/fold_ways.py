@@ -4,8 +4,8 @@ A fold curve is smooth in the configurations and the parameters, so that the she
 of it, but for cusps, at which it turns back in the parameters.
 """
 
-from collections.abc import Sequence
 from itertools import combinations
+from typing import NamedTuple
 
 import numpy as np
 
@@ -24,6 +24,13 @@ SAME_SIDE = 0.3
 """Least cosine between the sides of two folds that can belong to one fold curve in a triangle."""
 DETOUR = 1.2
 """Way from one end of a chord to the cusp and on to the other end, relative to the chord."""
+
+
+class PlanChord(NamedTuple):
+    """A chord of a polygon, and the number of its plan."""
+
+    plan: int
+    chord: Chord
 
 
 def continuous_ways(pairing: Pairing, plans: list[Plan], choices: list[Ways]) -> list[Ways]:
@@ -54,28 +61,31 @@ def continuous_ways(pairing: Pairing, plans: list[Plan], choices: list[Ways]) ->
         return float(normal[number, chord[0]] @ normal[number, chord[1]])
 
     chords = {
-        (number, chord): facing(number, chord)
+        PlanChord(number, chord): facing(number, chord)
         for number, ways in enumerate(choices)
         for chord in sorted({chord for way in ways for chord in way})
     }
     smooth = {each for each, cosine in chords.items() if cosine > SAME_SIDE}
     left = _ways_of(choices, smooth)
     # where no way is smooth, a cusp lies in the triangle
-    turning = [each for each, cosine in chords.items() if not left[each[0]] and cosine < -SAME_SIDE]
-    ends = [(plans[number].polygon.triangle, chord) for number, chord in turning]
-    cusps = dict(zip(turning, _cusps_between(pairing, ends), strict=True))
+    turning = [
+        each for each, cosine in chords.items() if not left[each.plan] and cosine < -SAME_SIDE
+    ]
+    triangles = [plans[number].polygon.triangle for number, _ in turning]
+    found = _cusps_between(pairing, triangles, [chord for _, chord in turning])
+    cusps = dict(zip(turning, found, strict=True))
     cusped = {each for each, cusp in cusps.items() if cusp is not None}
     more = [
-        [way for way in ways if _are_apart([cusps.get((number, chord)) for chord in way])]
+        [way for way in ways if _are_apart([cusps.get(PlanChord(number, each)) for each in way])]
         for number, ways in enumerate(_ways_of(choices, smooth | cusped))
     ]
     return [own or others for own, others in zip(left, more, strict=True)]
 
 
-def _ways_of(choices: list[Ways], good: set[tuple[int, Chord]]) -> list[Ways]:
+def _ways_of(choices: list[Ways], good: set[PlanChord]) -> list[Ways]:
     """Ways all of whose chords are among the good ones, which have the numbers of their plans."""
     return [
-        [way for way in ways if all((number, chord) in good for chord in way)]
+        [way for way in ways if all(PlanChord(number, chord) in good for chord in way)]
         for number, ways in enumerate(choices)
     ]
 
@@ -101,13 +111,12 @@ def _along_sides(
 
 
 def _cusps_between(
-    pairing: Pairing, chords: Sequence[tuple[int, Chord]]
+    pairing: Pairing, triangles: list[int], ends: list[Chord]
 ) -> list[Float[np.ndarray, " coordinates"] | None]:
     """Place of the cusp in the triangle of each chord on the fold between both its ends, if any."""
-    if not chords:
+    if not ends:
         return []
     setting, mesh, points = pairing.setting, pairing.mesh, pairing.points
-    triangles, ends = [each for each, _ in chords], [chord for _, chord in chords]
     z, p, _ = middles(setting, points, ends)
     directions = np.zeros((len(ends), 2, p.shape[1]))
     directions[:, :, setting.free] = planes(pairing, triangles) * setting.scales

@@ -39,7 +39,11 @@ class Slopes:
         return cls(np.zeros(shape), np.zeros(0, int), np.zeros(0))
 
     def fit(self, setting: Setting, points: Points) -> None:
-        """Compute what is missing."""
+        """Compute what is missing.
+
+        This corrects nothing by itself: points are exact, and the step that comes with their
+        tangents takes off what round-off is left.
+        """
         self._reserve(len(points.z))
         new = self.count + np.flatnonzero(points.vertex[self.count : points.count] >= 0)
         self.count = points.count

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from equimorph.arrays import Flags, Float, Int, Lanes, Parameters, Places, Some, Values
+from equimorph.arrays import Flags, Float, Int, Lanes, Places, Some, Values
 from equimorph.columns import Columns
 from equimorph.equilibria.critical import null_border
 from equimorph.linalg.lanes import over_lanes
@@ -110,7 +110,11 @@ class Stationary:
 
 @np.errstate(over="ignore", invalid="ignore")  # lanes that diverge are given up
 def stationary_points(setting: Setting, starts: Starts, *, saddles: bool) -> Stationary:
-    """Stationary points of the squared distance: its minima, or saddles as well."""
+    """Stationary points of the squared distance: its minima, or saddles as well.
+
+    This is no corrector onto F = 0: no state need exist there, and the curvature of the distance
+    tells at each step in which directions it is made stationary.
+    """
     structure, count = setting.structure, len(starts.cell)
     edges = np.zeros((count, len(setting.free), len(setting.base)))
     edges[:, :, setting.free] = starts.corners[:, 1:] - starts.corners[:, :1]
@@ -123,7 +127,10 @@ def stationary_points(setting: Setting, starts: Starts, *, saddles: bool) -> Sta
         known = reduction(structure, z[lanes], p[lanes], b[lanes], edges[lanes])
         newton = _newton_step(structure.mass, known, saddles=saddles)
         squared[lanes], pointed[lanes], step = newton.squared, newton.pointed, newton.step
-        _move(known, step, edges[lanes], (z, p, b), lanes)
+        # onto states of F + rb = 0, and along them; with the border of the null vector there
+        z[lanes] += known.remainder + np.einsum("nk,nki->ni", step, known.along_z)
+        p[lanes] += np.einsum("nk,nki->ni", step[:, 1:], edges[lanes])
+        b[lanes] = known.along_z[:, 0] / np.linalg.norm(known.along_z[:, 0], axis=1, keepdims=True)
         shares[lanes, 1:] += step[:, 1:]
         shares[lanes, 0] -= step[:, 1:].sum(axis=1)
         length = np.linalg.norm(step[:, 1:], axis=1)
@@ -137,21 +144,6 @@ def stationary_points(setting: Setting, starts: Starts, *, saddles: bool) -> Sta
     within = (shares >= OUTSIDE).all(axis=1)
     lost[lanes] = True
     return Stationary(p[:, setting.free], squared, ended & within, lost & within, pointed)
-
-
-def _move(
-    known: Reduction,
-    step: Float[np.ndarray, "some k1"],
-    edges: Float[np.ndarray, "some d parameters"],
-    state: tuple[Lanes, Parameters, Lanes],
-    lanes: Some,
-) -> None:
-    """Take steps: of states, parameters and borders, in place."""
-    z, p, b = state
-    z[lanes] += known.remainder + np.einsum("nk,nki->ni", step, known.along_z)
-    p[lanes] += np.einsum("nk,nki->ni", step[:, 1:], edges)
-    null = known.along_z[:, 0]
-    b[lanes] = null / np.linalg.norm(null, axis=1, keepdims=True)
 
 
 @dataclass(frozen=True)

@@ -284,7 +284,10 @@ def of_set(setting: Setting, points: States, cells: Cells, crossings: Facets) ->
 
 
 def _improve(series: Series, x: Values) -> Values:
-    """Roots of series by Newton's method, without steps that only follow round-off."""
+    """Roots of series by Newton's method, without steps that only follow round-off.
+
+    Numbers are corrected here, no points: states at these amplitudes come from `settle`.
+    """
     slopes, r = chebyshev.chebder(series), chebyshev.chebval(x, series, tensor=False)
     for _ in range(CORRECTIONS):
         with np.errstate(divide="ignore", invalid="ignore"):

@@ -184,7 +184,7 @@ class Independence:
         Row and column in F_z of each entry: of the gradients those with row − n ≥ 0 > column − n.
     mass
         Mass matrix of the n unknowns.
-    samples
+    z, p
         Random configurations with their parameters.
     """
 
@@ -193,14 +193,15 @@ class Independence:
         entries: Callable[[Lanes, Parameters], Entries],
         places: Int[np.ndarray, "2 entries"],
         mass: Float[np.ndarray, " n"],
-        samples: tuple[Lanes, Parameters],
+        z: Lanes,
+        p: Parameters,
     ) -> None:
         rows, columns = places
         self._entries, self._mass = entries, mass
         self._own = np.flatnonzero((rows >= len(mass)) & (columns < len(mass)))
         self._at = rows[self._own] - len(mass), columns[self._own]
         self._count = int(rows.max()) + 1 - len(mass)
-        sizes = np.linalg.norm(self._gradients(*samples), axis=2)
+        sizes = np.linalg.norm(self._gradients(z, p), axis=2)
         usable = np.isfinite(sizes).all(axis=1)
         self._typical = np.sqrt((sizes[usable] ** 2).mean(axis=0))
 

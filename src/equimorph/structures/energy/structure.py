@@ -312,7 +312,7 @@ class EnergyStructure(DiscreteStructure):
         generator = np.random.default_rng(0)
         p = np.nan_to_num(np.repeat(self._reference[None], SAMPLES, axis=0), nan=1.0)
         places = np.stack([self.layout.rows, self.layout.columns])
-        return Independence(self.entries, places, self.mass, (self.sample(p, generator), p))
+        return Independence(self.entries, places, self.mass, self.sample(p, generator), p)
 
     @cached_property
     def _corners(self) -> Tape:

@@ -21,7 +21,7 @@ from equimorph.model import (
 )
 from equimorph.structures.collapse import Shortening
 from equimorph.structures.frame.strength import StressedFrame
-from equimorph.structures.material_points import MaterialPoints, SupportSprings
+from equimorph.structures.material_points import MaterialPoints, SupportSpring, SupportSprings
 from equimorph.structures.network import direction_of_mechanism
 from equimorph.structures.resolution import Refinable
 from equimorph.structures.rod.discretisation import error_by_refinement
@@ -328,7 +328,7 @@ class AnyFrame(StressedFrame, Shortening, Refinable):
 
     @property
     @abstractmethod
-    def springs_of_joints(self) -> list[tuple[float, np.ndarray, np.ndarray]]:
+    def springs_of_joints(self) -> list[SupportSpring]:
         """Stiffness of each spring along an axis, gaps that it opens, and moves of all joints."""
 
     @property
@@ -338,7 +338,7 @@ class AnyFrame(StressedFrame, Shortening, Refinable):
         if points is None:
             return None
         starts = np.repeat(self.network.ends[:, 0], len(self.model.mesh.weights))
-        each = [(stiff, gaps, moves[starts]) for stiff, gaps, moves in self.springs_of_joints]
+        each = [one._replace(moves=one.moves[starts]) for one in self.springs_of_joints]
         springs = SupportSprings.of(each, self.constraints, self.network.space)
         return None if springs.follow else replace(points, springs=springs)
 

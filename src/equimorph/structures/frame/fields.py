@@ -13,6 +13,7 @@ from equimorph.structures.frame.any_frame import AnyFrame
 from equimorph.structures.frame.mechanics import FrameMechanics, Points
 from equimorph.structures.frame.model import FrameModel
 from equimorph.structures.frame.strength import Nodal as NodalForces, NodalStrains
+from equimorph.structures.material_points import SupportSpring
 from equimorph.structures.rod.extrema import largest_norms
 
 LARGEST_GAP = 1e-4
@@ -50,14 +51,15 @@ class FrameFields(FrameMechanics, AnyFrame):
         return tuple((each.members[:, self.model.owner], each.supports) for each in found)
 
     @property
-    def springs_of_joints(self) -> list[tuple[float, np.ndarray, np.ndarray]]:
+    def springs_of_joints(self) -> list[SupportSpring]:
         """Of the supports in x and in y."""
         found = []
         for axis, (_, carried) in enumerate(self._unit_loads):
             stiff = self.model.supports[:, axis]
             for j in np.flatnonzero((stiff > 0.0) & np.isfinite(stiff)):
                 gaps = self._reactions[axis][j, : self.constraints]
-                found.append((stiff[j], gaps, -carried[:, j, None] * np.eye(2)[axis]))
+                moves = -carried[:, j, None] * np.eye(2)[axis]
+                found.append(SupportSpring(stiff[j], gaps, moves))
         return found
 
     @property
@@ -236,7 +238,7 @@ class FrameFields(FrameMechanics, AnyFrame):
             if stiffness.any():
                 inward = unit_vectors(turns[:, joint] + self._inward_angle(joint))
                 held = np.eye(2), stiffness[:2]
-                found += supports_of_point(held, float(stiffness[2]), places[:, joint], inward)
+                found += supports_of_point(*held, float(stiffness[2]), places[:, joint], inward)
         return tuple(found)
 
     def drawn_pressures(self, z: Lanes, p: Parameters) -> list[Forces]:

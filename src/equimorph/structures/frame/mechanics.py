@@ -327,7 +327,7 @@ class FrameMechanics(DiscreteStructure):
         moments = stretch * s_vw + first_v * sw + first_w * sv + gamma * p_vw * here.shear
         out, bent = np.empty_like(z), -multiply(moments, self._gather)
         if self.pressure is not None:
-            bent += self.pressure.second(y, turns, (yv, tv), (yw, tw))
+            bent += self.pressure.second(y, turns, yv, tv, yw, tw)
         out[:, : self.unknowns] = bent[:, model.place >= 0]
         # a multiplier's P = along cos ψ + across sin ψ, its first and second changes
         twice = gamma * p_vw - stretch * dv * dw

@@ -255,15 +255,15 @@ class FramePressure:
         return np.asarray(-np.sum(parts, axis=0))
 
     def second(
-        self, y: Scalars, turns: Nodal, v: tuple[Scalars, Nodal], w: tuple[Scalars, Nodal]
+        self, y: Scalars, turns: Nodal, yv: Scalars, tv: Nodal, yw: Scalars, tw: Nodal
     ) -> Nodal:
-        """Second change of these along two directions."""
+        """Second change of these along two directions v and w, of scalars and of turns."""
         parts = []
         for each in self.chains:
-            psi, by_v, by_w = (each.at(part) for part in (turns, v[1], w[1]))
+            psi, by_v, by_w = (each.at(part) for part in (turns, tv, tw))
             part = each.pull(y) * each.area.second(psi, by_v, by_w)
-            part = part + each.pull(v[0]) * each.area.gradient_derivative(psi, by_w)
-            part = part + each.pull(w[0]) * each.area.gradient_derivative(psi, by_v)
+            part = part + each.pull(yv) * each.area.gradient_derivative(psi, by_w)
+            part = part + each.pull(yw) * each.area.gradient_derivative(psi, by_v)
             parts.append(each.spread(part))
         return np.asarray(-np.sum(parts, axis=0))
 

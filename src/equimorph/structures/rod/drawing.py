@@ -66,7 +66,7 @@ def rod_supports(ends: tuple[Support, Support], line: Centreline) -> tuple[Symbo
     for side, end in enumerate(ends):
         inward = (1.0 - 2.0 * side) * line.tangents[:, side]
         places, turning = line.places[:, side], stiffness(end.turning)
-        found += supports_of_point(end.along_directions, turning, places, inward)
+        found += supports_of_point(*end.along_directions, turning, places, inward)
     return tuple(found)
 
 

@@ -8,7 +8,7 @@ from typing import Any, ClassVar, TypeVar
 import numpy as np
 
 from equimorph.arrays import Float
-from equimorph.structures.material_points import SupportSprings
+from equimorph.structures.material_points import SupportSpring, SupportSprings
 from equimorph.structures.rod.discretisation import Mesh
 from equimorph.structures.rod.ends import FREE, Axis, compliance
 
@@ -142,12 +142,12 @@ def support_energy(
 
 def _springs_of(
     axis: Axis, first: Float[np.ndarray, " multipliers"], last: Float[np.ndarray, " multipliers"]
-) -> list[tuple[float, np.ndarray, np.ndarray]]:
+) -> list[SupportSpring]:
     """Stiffness, gap and moves of the springs at A and B; the rod is drawn from the first held."""
     unit, drawn_from_last = np.array([axis.unit]), axis.first == FREE
     both = (axis.first, first, not drawn_from_last), (axis.last, -last, drawn_from_last)
     return [
-        (held, gap, unit if moves else 0.0 * unit)
+        SupportSpring(held, gap, unit if moves else 0.0 * unit)
         for held, gap, moves in both
         if not isinstance(held, str)
     ]

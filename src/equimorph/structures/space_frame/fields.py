@@ -11,6 +11,7 @@ from equimorph.model.drawing import supports_of_point
 from equimorph.structures.frame.any_frame import AnyFrame
 from equimorph.structures.frame.statics import SpaceFlows
 from equimorph.structures.frame.strength import Nodal, NodalStrains
+from equimorph.structures.material_points import SupportSpring
 from equimorph.structures.rod.extrema import largest_norms
 from equimorph.structures.space_frame.mechanics import SpatialFrameMechanics
 from equimorph.structures.space_frame.model import SpatialFrameModel
@@ -34,7 +35,7 @@ def spatial_symbols(
             here, turning = places[:, joint], np.inf if support.holds_rotation else 0.0
             inward = np.broadcast_to(_inward(made, joint), here.shape)
             held = support.directions, support.stiffness
-            found += supports_of_point(held, turning, here, inward)
+            found += supports_of_point(*held, turning, here, inward)
     return tuple(found)
 
 
@@ -87,7 +88,7 @@ class SpatialFrameFields(SpatialFrameMechanics, AnyFrame):
         return np.asarray(moves.reshape(len(z), len(model.network.joints), 3))
 
     @property
-    def springs_of_joints(self) -> list[tuple[float, np.ndarray, np.ndarray]]:
+    def springs_of_joints(self) -> list[SupportSpring]:
         """Of the supports along their directions."""
         model, found = self.model, []
         carried, cube = self._unit_loads.supports, model.length**3 / model.bending
@@ -96,7 +97,7 @@ class SpatialFrameFields(SpatialFrameMechanics, AnyFrame):
                 if np.isfinite(stiff):
                     gaps = model.forces.supports[: self.constraints, j] @ unit
                     moves = -(carried[:, j] @ unit).reshape(-1, 3)
-                    found.append((stiff * cube, gaps, moves))
+                    found.append(SupportSpring(stiff * cube, gaps, moves))
         return found
 
     def reactions(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes joints 3"]:

@@ -259,7 +259,7 @@ class TrussMechanics(AnyNetwork):
         for joint, held in enumerate(made.held):
             firm = axes[held], np.full(held.sum(), np.inf)
             inward = np.broadcast_to(axes[0], (len(z), made.space))
-            supports += supports_of_point(firm, 0.0, places[:, joint], inward)
+            supports += supports_of_point(*firm, 0.0, places[:, joint], inward)
         forces = self.moves_of(multiply(p, self.pulls))
         moved = np.flatnonzero(self.rates.any(axis=1))
         at = np.flatnonzero(self.moves_of(self.pulls).any(axis=(0, 2)))

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from functools import partial
 from html import escape
 from types import MappingProxyType
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 from pydantic import Field
 
@@ -130,35 +130,42 @@ def _in_words(load: str, name: str, law: ImperfectionLaw) -> str:
     return f"limit {load} = {html.number(law.perfect)} {change} ({law.law})"
 
 
-class RoomKind(Kind[tuple[State, Room]]):
+class StateRoom(NamedTuple):
+    """A state and the room around it."""
+
+    state: State
+    room: Room
+
+
+class RoomKind(Kind[StateRoom]):
     """How far parameters may stray from a state."""
 
     table = "room"
     tasks = (stable_room,)
     names = MappingProxyType({"states": "state"})
 
-    def answer(self, question: Question, arguments: Arguments) -> tuple[State, Room]:
+    def answer(self, question: Question, arguments: Arguments) -> StateRoom:
         """Lift rays from the state."""
-        return arguments["states"], stable_room(**arguments.of(stable_room))
+        return StateRoom(arguments["states"], stable_room(**arguments.of(stable_room)))
 
-    def figures(self, question: Question, answer: tuple[State, Room]) -> list[Figure]:
+    def figures(self, question: Question, answer: StateRoom) -> list[Figure]:
         """Where it lies, over two parameters."""
         draw = partial(plotting.room, *answer, question.eset)
         caption = "The room around the state (●) and where it ends (×)."
         two = len(question.section.tolerances) == 2
         return [still(question.files, draw, caption)] if two else []
 
-    def words(self, question: Question, answer: tuple[State, Room]) -> str:
+    def words(self, question: Question, answer: StateRoom) -> str:
         """Its size."""
-        room = answer[1]
+        room = answer.room
         size = f"the {question.section.shape} of {html.number(room.least, 6)} tolerances"
         if room.kind[0] == "arrived":
             return f"{size} is stable, the largest that was tried."
         return f"stable up to {size}; then {room.kind[0]}."
 
-    def details(self, question: Question, answer: tuple[State, Room]) -> list[str]:
+    def details(self, question: Question, answer: StateRoom) -> list[str]:
         """Its sides."""
-        box = answer[1].boxes[0]
+        box = answer.room.boxes[0]
         rows = [
             [escape(name), html.number(low, 6), html.number(high, 6)]
             for name, low, high in zip(box.names, box.lower, box.upper, strict=True)

@@ -4,6 +4,7 @@ from dataclasses import replace
 from functools import partial
 from html import escape
 from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
 from pydantic import Field
@@ -29,47 +30,55 @@ CAPTION = (
 )
 
 
-class SnapKind(Kind[tuple[State, LeastSnap]]):
+class StateSnap(NamedTuple):
+    """A state and the least snap from it."""
+
+    state: State
+    snap: LeastSnap
+
+
+class SnapKind(Kind[StateSnap]):
     """The least change of parameters that makes a state snap, and where it lands."""
 
     table = "snap"
     tasks = (least_snap,)
 
-    def answer(self, question: Question, arguments: Arguments) -> tuple[State, LeastSnap]:
+    def answer(self, question: Question, arguments: Arguments) -> StateSnap:
         """Find the least change."""
-        return arguments["state"], least_snap(**arguments.of(least_snap))
+        return StateSnap(arguments["state"], least_snap(**arguments.of(least_snap)))
 
-    def figures(self, question: Question, answer: tuple[State, LeastSnap]) -> list[Figure]:
+    def figures(self, question: Question, answer: StateSnap) -> list[Figure]:
         """State, fold and landing on the plane."""
         return figures_of_states(question, _stations(answer))
 
-    def words(self, question: Question, answer: tuple[State, LeastSnap]) -> str:
+    def words(self, question: Question, answer: StateSnap) -> str:
         """Change and landing."""
-        snap = answer[1]
+        snap = answer.snap
         assert snap.landing is not None
         moves = ", ".join(f"{name} by {value:+.6g}" for name, value in snap.change.items())
         end, least = snap.landing, f" ({snap.why})" if snap.why else ""
         released = f"{end.released:.4g} released{least}"
         return f"the least way to a snap is {moves}; {end.status}, {released}."
 
-    def details(self, question: Question, answer: tuple[State, LeastSnap]) -> list[str]:
+    def details(self, question: Question, answer: StateSnap) -> list[str]:
         """A table of state, fold and landing."""
         states = _stations(answer)
         more = {
             "": ["state", "edge of stability", "landing"][: len(states)],
             **{
-                each: [html.number(value, 6) for value in states[each]] for each in answer[1].change
+                each: [html.number(value, 6) for value in states[each]]
+                for each in answer.snap.change
             },
         }
         return table_of_states(states, [states.structure.elevation], more)
 
-    def refusal(self, question: Question, answer: tuple[State, LeastSnap]) -> str:
+    def refusal(self, question: Question, answer: StateSnap) -> str:
         """Reason why no snap was found."""
         del question
-        return "" if answer[1].landing is not None else answer[1].why
+        return "" if answer.snap.landing is not None else answer.snap.why
 
 
-def _stations(answer: tuple[State, LeastSnap]) -> States:
+def _stations(answer: StateSnap) -> States:
     """State, fold and landing."""
     state, snap = answer
     further = () if snap.states is None else (snap.states,)

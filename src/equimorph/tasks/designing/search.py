@@ -115,7 +115,7 @@ class Bundle:
         """Bounds that may be met within a trust region, by their slopes."""
         family, kept = self.problem.family, []
         for each in self.bounded:
-            here = self._at((each.x, each.piece), self.x)
+            here = self._at(each.x, each.piece, self.x)
             rise = np.abs(here.slopes(family, self.x)).sum(axis=1) * trust
             if ((here.values - each.level + FAR * rise) / each.size).max() > 0.0:
                 kept.append(each)
@@ -149,7 +149,7 @@ class Bundle:
 
     def excess(self, x: Vector) -> float:
         """Largest excess of bounded pieces over their levels, relative to the size of these."""
-        found = [b.excess(self._at((b.x, b.piece), x)) for b in self.kept]
+        found = [b.excess(self._at(b.x, b.piece, x)) for b in self.kept]
         return max(found, default=-np.inf)
 
     def level(self, x: Vector) -> float:
@@ -159,7 +159,7 @@ class Bundle:
 
     def objective_at(self, x: Vector) -> list[Piece]:
         """The objective's pieces at some variables."""
-        return [self._at(each, x) for each in self.objective]
+        return [self._at(*each, x) for each in self.objective]
 
     def still_counts(self, old: Judged, new: Judged) -> bool:
         """Whether values of an earlier design are not contradicted by a rebuilt one."""
@@ -173,10 +173,9 @@ class Bundle:
                     return False
         return True
 
-    def _at(self, known: tuple[Vector, Piece], x: Vector) -> Piece:
-        """A piece at some variables, followed from the nearest ones where it is known."""
-        _, piece = known
-        near = self._pieces.setdefault(id(piece), [known])
+    def _at(self, start: Vector, piece: Piece, x: Vector) -> Piece:
+        """A piece at some variables, followed from the nearest ones where it is known already."""
+        near = self._pieces.setdefault(id(piece), [(start, piece)])
         at, there = min(near, key=lambda each: float(np.abs(each[0] - x).max()))
         if not np.array_equal(at, x):
             found = follow_piece(there, self.problem.family, at, x)
@@ -192,8 +191,7 @@ class Bundle:
         counting = [] if self.restoring else self.objective_at(x)
         rows = [(piece, level * self.scale, self.scale, True) for piece in counting]
         bounded = [
-            (self._at((b.x, b.piece), x), b.level + slack * b.size, b.size, False)
-            for b in self.kept
+            (self._at(b.x, b.piece, x), b.level + slack * b.size, b.size, False) for b in self.kept
         ]
         return rows + bounded
 

@@ -139,7 +139,7 @@ def _block(
     p[:, free] = here.p[free]
     guess = _predict(course, here, course.at(np.array([time])), p, targets)
     begin = np.repeat(here.z[None], len(p), axis=0), np.repeat(here.p[None], len(p), axis=0)
-    way = distances(structure, guess, begin)
+    way = distances(structure, *guess, *begin)
     found = correct_onto_targets(structure, *guess, free, course.descriptors, targets)
     good = found.found & (found.first <= SURE * way + EXACT)
     z, p = np.concatenate([here.z[None], found.z]), np.concatenate([here.p[None], found.p])

@@ -142,7 +142,7 @@ def _step(course: Course, here: _Here, step: float, time: float) -> tuple[_Here,
     own = np.array([k for k in course.free if k not in here.held], int)
     found = correct_onto_targets(course.structure, z, given, own, course.descriptors, targets)
     still = np.zeros_like(off_z), np.zeros_like(off_p)
-    error = float(distances(course.structure, (off_z, off_p), still)[0])
+    error = float(distances(course.structure, off_z, off_p, *still)[0])
     good = bool(found.found[0]) and np.isfinite(error)
     return _Here(found.z, found.p, time, here.held), error if good else np.inf
 
@@ -159,7 +159,7 @@ def _fault(
     if not error <= TOLERANCE:
         return "error"
     structure = course.structure
-    if distances(structure, (there.z, there.p), (here.z, here.p))[0] > LARGEST:
+    if distances(structure, there.z, there.p, here.z, here.p)[0] > LARGEST:
         return "long"
     if structure.index(there.z, there.p)[0] != 0:
         return "unstable"

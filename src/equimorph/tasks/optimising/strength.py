@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from itertools import product
+from operator import itemgetter
 from typing import Literal
 
 import numpy as np
@@ -345,11 +346,13 @@ def _raise_minimum(
         maximise_least(pieces, vertex, radius, box, ACROSS)
         for vertex in _vertices(lmap, value)[:ROBUST]
     ]
-    hopeful = [place for place, least in ends if least >= HOPELESS * max(ends, key=_least)[1]]
+    hopeful = [
+        place for place, least in ends if least >= HOPELESS * max(ends, key=itemgetter(1))[1]
+    ]
     # across a jump the search goes on in all directions; what follows is the exact one
     tops = [climb(worst, place, 0.1 * radius, box, ACROSS) for place in hopeful]
     exact = [maximise_least(pieces, top.setting, 0.1 * radius, box) for top in tops]
-    return max(exact, key=_least)
+    return max(exact, key=itemgetter(1))
 
 
 def _worst_at_vertices(
@@ -367,7 +370,3 @@ def _worst_at_vertices(
     if len(rest):
         out[rest] = worst(settings[rest])
     return out.reshape(lmap.value.shape)
-
-
-def _least(end: tuple[Float[np.ndarray, " 2"], float]) -> float:
-    return end[1]

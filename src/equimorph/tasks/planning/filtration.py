@@ -98,7 +98,7 @@ class Filtration:
         none = np.full(len(passages.facets), np.inf)
         shut = cls(eset, objective, constraints, passages, none, np.zeros(passages.facets.shape))
         values = objective.sign * stable_values(eset, objective.descriptor)
-        return shut._open(np.arange(len(none)), values[passages.facets], None)
+        return shut._open(np.arange(len(none)), values[passages.facets])
 
     def with_kinks(self, some: Items) -> "Filtration":
         """The same with some facets opened where branches of the objective cross on them."""
@@ -107,19 +107,26 @@ class Filtration:
         states = self.eset.points[vertices]
         known = self.objective.branches(states.z, states.p)
         place = place.reshape(facets.shape)
-        return self._open(some, known[0].max(axis=1)[place], (known, place))
+        return self._open(some, known[0].max(axis=1)[place], known, place)
 
     def _open(
-        self, some: Items, values: Shares, kinks: tuple[Branches, Facets] | None
+        self,
+        some: Items,
+        values: Shares,
+        known: Branches | None = None,
+        place: Facets | None = None,
     ) -> "Filtration":
-        """Facets opened at the least values on their edges, if these are lower than before."""
+        """Facets opened at the least values on their edges, if these are lower than before.
+
+        known, place: branches that cross on edges, and their rows for each vertex of the facets.
+        """
         level, shares = self.level.copy(), self.shares.copy()
         corners = values.shape[1]
         excess = self._excess(some)
         for i, j in combinations(range(corners), 2) if corners > 1 else ((0, 0),):
             lines = values[:, [i, j, i, j]].reshape(-1, 2, 2)
-            if kinks is not None:
-                lines = _crossing_lines(kinks[0], kinks[1][:, i], kinks[1][:, j])
+            if known is not None and place is not None:
+                lines = _crossing_lines(known, place[:, i], place[:, j])
             t, least = _least_between(lines, *_window(excess[:, :, i], excess[:, :, j]))
             lower = np.flatnonzero(least < level[some])
             at = some[lower]

@@ -112,7 +112,7 @@ class Slices:
     def _station(self, state: State) -> int:
         """Number of a state among the stations, of which it becomes one if it is none."""
         known = join_states(self.structure, self.stations)
-        gap = distances(self.structure, (known.z, known.p), (state.z[None], state.p[None]))
+        gap = distances(self.structure, known.z, known.p, state.z[None], state.p[None])
         if gap.min() < MATCH:
             return int(gap.argmin())
         self.stations.append(state)
@@ -194,7 +194,7 @@ class Slices:
         ]
         for states, goal in zip(sides, self.stations[1::-1], strict=True):
             near = join_states(self.structure, states)
-            gap = distances(self.structure, (near.z, near.p), (goal.z[None], goal.p[None]))
+            gap = distances(self.structure, near.z, near.p, goal.z[None], goal.p[None])
             station = self._station(near[int(gap.argmin())]) if len(near) else 0
             if station >= count:
                 yield station

@@ -234,7 +234,7 @@ def solve_shapes(
         groups = [_fit(known, each, constraints) for each in numbers]
     else:
         groups = _solve(known, numbers, constraints)
-    index, own = _sort_keys(eset, groups, "" if rank == "route" else rank)
+    index, own = _sort_keys(eset, [own for own, _ in groups], "" if rank == "route" else rank)
     closest, answers = known.closest(numbers), []
     for k, (values, (states, misfit)) in enumerate(zip(numbers, groups, strict=True)):
         routes = [] if start is None else [plan(eset, start, s, within=within) for s in states]
@@ -247,15 +247,15 @@ def solve_shapes(
 
 
 def _sort_keys(
-    eset: EquilibriumSet, groups: list[tuple[States, Values]], rank: str
+    eset: EquilibriumSet, groups: list[States], rank: str
 ) -> tuple[list[Int[np.ndarray, " lanes"]], list[Values]]:
     """Index of each state of groups, and what is least for the best of each: energy or margin."""
-    states = join_states(eset.structure, [own for own, _ in groups])
+    states = join_states(eset.structure, groups)
     key = np.zeros(len(states))
     if len(states) and rank:
         key = states.energy if rank == "energy" else -states.margin
     index = states.index if len(states) else np.zeros(0, int)
-    ends = np.cumsum([len(own) for own, _ in groups])[:-1]
+    ends = np.cumsum([len(own) for own in groups])[:-1]
     return np.split(index, ends), np.split(key, ends)
 
 
