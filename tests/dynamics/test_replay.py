@@ -10,7 +10,7 @@ from scipy.special import ai_zeros
 
 import equimorph as em
 from equimorph.dynamics import ReplaySettings, replay
-from equimorph.dynamics.fold_delay import FoldDelay
+from equimorph.dynamics.balance import FoldDelay
 from equimorph.dynamics.linkage_model import LinkageModel
 from equimorph.dynamics.rods import ChainedRod
 

@@ -13,8 +13,8 @@ import equimorph as em
 from equimorph.errors import InputError, LostWorkersError
 from equimorph.manifold import VertexKind, build
 from equimorph.manifold.lifting.grid import grid_mesh
-from equimorph.manifold.lifting.tile_cells import Closed
 from equimorph.manifold.lifting.tile_floods import Flooded
+from equimorph.manifold.lifting.tile_rounds import Closed
 from equimorph.manifold.lifting.tiles import cuts_between, mesh_of_tile, tiles_of
 from same_records import assert_equal
 from typecheck import unchecked

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from equimorph.arrays import Float, Lanes, Parameters
-from equimorph.dynamics.fold_delay import FoldDelay
+from equimorph.dynamics.balance import FoldDelay
 from equimorph.dynamics.model import Course, Model, Motion, Plant, Points, Row, stable_near
 from equimorph.dynamics.motion import equilibria_along
 from equimorph.dynamics.plant import mujoco_module

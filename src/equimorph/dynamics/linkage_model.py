@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from equimorph.arrays import Float
-from equimorph.dynamics.balance import Balance, Quasistatics, balance, follow
-from equimorph.dynamics.fold_delay import fold_delay
+from equimorph.dynamics.balance import Balance, Quasistatics, balance, fold_delay, follow
 from equimorph.dynamics.mechanism import Pulls, Settings, Vector
 from equimorph.dynamics.model import Course, Model, Motion, Plant, Points, Row
 from equimorph.dynamics.plant import Chained, Simulation

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from equimorph.arrays import Float
-from equimorph.dynamics.fold_delay import FoldDelay
+from equimorph.dynamics.balance import FoldDelay
 from equimorph.equilibria import settle, snap_landing
 from equimorph.errors import InputError
 from equimorph.structures import State, States, Structure

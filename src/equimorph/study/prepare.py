@@ -9,9 +9,8 @@ from equimorph.structures import States, Structure, from_identity
 from equimorph.study.complaint import Findings
 from equimorph.study.kinds import KINDS
 from equimorph.study.lookup import Extent, Ground, at_key, check_point
-from equimorph.study.problem import Study
+from equimorph.study.problem import Study, extent_of_set
 from equimorph.study.question import Question
-from equimorph.study.set_section import extent_of_set
 from equimorph.study.structures import StructureSection
 
 

@@ -15,8 +15,8 @@ from equimorph.manifold import equilibrium_set
 from equimorph.structures import KINDS as STRUCTURES
 from equimorph.study.fields import Section
 from equimorph.study.kinds import KINDS
+from equimorph.study.problem import SetSection
 from equimorph.study.question import Kind
-from equimorph.study.set_section import SetSection
 from equimorph.study.structures import SECTIONS
 
 TITLE = """\

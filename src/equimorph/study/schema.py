@@ -14,9 +14,8 @@ from equimorph.structures import KINDS as STRUCTURES
 from equimorph.study.fields import Section
 from equimorph.study.kinds import KINDS
 from equimorph.study.lookup import RuleSection
-from equimorph.study.problem import STUDY
+from equimorph.study.problem import STUDY, PointSection, SetSection
 from equimorph.study.reference import meanings, meanings_of_kind, meanings_of_set
-from equimorph.study.set_section import PointSection, SetSection
 from equimorph.study.states import NaturalSection, StateSection
 from equimorph.study.structures import (
     PARTS,

@@ -1,6 +1,11 @@
 """What grid cells hide from their edges: necks and holes inside, and points where sheets touch.
 
 See docs/decisions.md, "Approaching sheets are followed to where they are nearest".
+
+Nor need the straight crossings of sheets in grid triangles show all that the curved ones do.
+Between two nearly parallel pitchfork curves a side branch is a strip. Where it is narrower than the
+grid and passes over a vertex, its edges show a crossing on each of two sides of a triangle, and
+their chord would close the strip around the vertex; yet both crossings lead on through the third.
 """
 
 from dataclasses import dataclass, field, replace
@@ -8,23 +13,26 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from equimorph.arrays import Bool, CellFlags, Float, Place, Some
+from equimorph.manifold.geometry.crossings import crossing_directions
+from equimorph.manifold.geometry.exact_points import pin_crossings
 from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.setting import Setting
 from equimorph.manifold.lifting.cells import Cells, Seen
 from equimorph.manifold.lifting.courses import on_sides, ways_out
-from equimorph.manifold.lifting.crossing_chords import crossing_turns
 from equimorph.manifold.lifting.fold_chords import (
     FoldChords,
     Turns,
     beyond_folds,
+    chords_across,
     facing_folds,
     facing_sides,
     fold_chords,
+    lie_inside,
     sharp_turns,
 )
 from equimorph.manifold.lifting.grid import NEAR_AN_END
 from equimorph.manifold.lifting.pairing import Pairing
-from equimorph.manifold.lifting.polygon_cuts import chord_of
+from equimorph.manifold.lifting.polygon_cuts import chord_of, planes
 from equimorph.manifold.lifting.stationary_points import approaches, stationary_points
 from equimorph.tolerances import SAME_STATE
 
@@ -145,7 +153,7 @@ def _torn(pairing: Pairing, chords: FoldChords) -> tuple[Some, dict[int, float]]
 
 def _strips(pairing: Pairing, cells: Cells, wanted: Bool[np.ndarray, " T"]) -> Unseen:
     """Triangles that crossings of sheets leave through a side which does not show it."""
-    turns = crossing_turns(pairing, cells, wanted)
+    turns = _crossing_turns(pairing, cells, wanted)
     nowhere = np.zeros((0, pairing.mesh.dimension))
     if turns is None:
         return Unseen(np.zeros(0, int), nowhere)
@@ -178,3 +186,26 @@ def _distinct(places: Places, setting: Setting) -> Places:
         if all(np.linalg.norm((place - other) / setting.scales) > SAME_STATE for other in kept):
             kept.append(place)
     return np.array(kept).reshape(-1, len(setting.free))
+
+
+def _crossing_turns(pairing: Pairing, cells: Cells, wanted: Bool[np.ndarray, " T"]) -> Turns | None:
+    """Crossings that lead through the third side of a triangle from both ends, and their middles.
+
+    None if there are none. They are looked for in the flagged triangles.
+    """
+    points, setting = pairing.points, pairing.setting
+    ends, triangle = chords_across(pairing, cells.crossings, wanted)
+    if len(ends) == 0:
+        return None
+    used, place = np.unique(ends, return_inverse=True)
+    along = crossing_directions(setting, points.z[used], points.p[used])
+    across = np.stack([-along[:, 1], along[:, 0]], axis=-1)[place.reshape(ends.shape)]
+    ways = ways_out(pairing, ends, triangle, across)
+    chosen = ways.apexes[:, 0] == ways.apexes[:, 1]
+    ends, triangle, across = ends[chosen], triangle[chosen], across[chosen]
+    if len(ends) == 0:
+        return None
+    span = planes(pairing, triangle.tolist())
+    middle = pin_crossings(setting, points, ends.tolist(), span)
+    inside = middle.found & lie_inside(pairing, triangle, ends, middle.p)
+    return Turns(ends, triangle, across, middle.z, middle.p, inside)
