@@ -15,8 +15,7 @@ import pytest
 
 import equimorph as em
 from equimorph import cluster
-from equimorph.errors import MissingError
-from equimorph.optional_packages import load_package
+from equimorph.errors import MissingError, load_package
 from equimorph.study import run_study
 from same_records import assert_equal
 

@@ -20,10 +20,9 @@ from pathlib import Path
 from typing import Any
 
 from equimorph.argument_checks import check_arguments
-from equimorph.errors import InputError, LostWorkersError
+from equimorph.errors import InputError, LostWorkersError, load_package
 from equimorph.linalg.lanes import one_thread
 from equimorph.model import Workers
-from equimorph.optional_packages import load_package
 
 AHEAD = 2
 """Chunks in the cluster for each of its threads: one is computed, one is on its way."""

@@ -1,7 +1,12 @@
-"""Errors that a caller can cause. Numerical failures are values with a status, never exceptions."""
+"""Errors that a caller can cause. Numerical failures are values with a status, never exceptions.
+
+Packages that extras install are loaded on first use, with such an error where one is missing.
+"""
 
 import difflib
 from collections.abc import Sequence
+from importlib import import_module
+from typing import Any
 
 
 class EquimorphError(Exception):
@@ -40,3 +45,30 @@ def suggestion(written: str, allowed: Sequence[str]) -> str:
     known = {name.lower(): name for name in allowed}
     close = difflib.get_close_matches(written.lower(), known, n=1)
     return f" Did you mean {known[close[0]]}?" if close else ""
+
+
+def load_package(module: str, extra: str, what: str, otherwise: str = "") -> Any:
+    """Load a package that an extra of this one installs.
+
+    Parameters
+    ----------
+    module, extra
+        Its name, and that of the extra.
+    what
+        What needs it, for the message.
+    otherwise
+        What one may do instead.
+
+    Raises
+    ------
+    MissingError
+        If it is not installed, with the command that installs it.
+    """
+    try:
+        return import_module(module)
+    except ImportError as error:
+        name = module.partition(".")[0]
+        raise MissingError(
+            f"`{what}` must have the package {name}; got none. Run: pip install "
+            f'"equimorph[{extra}]"{otherwise}.'
+        ) from error

@@ -11,7 +11,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from equimorph.arrays import Shaped
-from equimorph.optional_packages import load_package
+from equimorph.errors import load_package
 
 Column = Shaped[np.ndarray, " rows"] | Sequence[object]
 

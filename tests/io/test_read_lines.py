@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import equimorph as em
+from equimorph.errors import load_package
 from equimorph.io import read_lines
-from equimorph.optional_packages import load_package
 
 ARCH = np.array([[-1.0, 0.0, 0.0], [0.0, 0.0, 0.5], [1.0, 0.0, 0.0]])
 SQUARE = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0.5], [0, 1, 0]])

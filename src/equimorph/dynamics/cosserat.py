@@ -14,8 +14,7 @@ from equimorph.dynamics.linkage import Linkage
 from equimorph.dynamics.mechanism import Settings
 from equimorph.dynamics.model import Plant, Points, Row, stable_near
 from equimorph.dynamics.rods import ChainedRod, stiffness_and_rest
-from equimorph.errors import InputError
-from equimorph.optional_packages import load_package
+from equimorph.errors import InputError, load_package
 from equimorph.structures import Rod, State, States
 from equimorph.structures.rod.any_description import construction
 

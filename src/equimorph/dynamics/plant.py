@@ -17,7 +17,7 @@ from equimorph.dynamics.linkage import Linkage
 from equimorph.dynamics.mechanism import Mechanism, Settings, Vector
 from equimorph.dynamics.tree import WORLD, tree_of
 from equimorph.dynamics.writer import Writer
-from equimorph.optional_packages import load_package
+from equimorph.errors import load_package
 from equimorph.structures import State, States, Structure
 
 

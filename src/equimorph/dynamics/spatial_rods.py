@@ -38,7 +38,7 @@ from equimorph.structures.rod.terms import Term
 from equimorph.structures.rod.units import FOUR_PI_SQUARED
 from equimorph.structures.spatial.ends import support_axes
 from equimorph.structures.spatial.model import ANGLES, AXES, Build
-from equimorph.structures.spatial.orbits import on_orbit
+from equimorph.structures.spatial.natural import on_orbit
 from equimorph.structures.spatial.phase import PinnedMechanics
 from equimorph.structures.spatial.quaternions import exponential, product
 

@@ -13,13 +13,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from equimorph.arrays import Flags, Float, Lanes, Parameters, Some, Values
-from equimorph.equilibria.compiled import Line, Workspace, compiled_steps
 from equimorph.equilibria.critical import Critical, normal_form, null_border
 from equimorph.equilibria.curves import AlongCurve, Curve, along_parameters, dual, squared_length
 from equimorph.equilibria.newton_step import Planes
 from equimorph.equilibria.point_conditions import Crossing
 from equimorph.equilibria.settle import Guards, Settled, settle
-from equimorph.equilibria.steps import Bracket, Front, new_scalars
+from equimorph.equilibria.steps import Bracket, Front, Line, Workspace, compiled_steps, new_scalars
 from equimorph.linalg.simd import LANES
 from equimorph.marching import event_kernels as roots, kernels, tick_kernels as ticks
 from equimorph.marching.kernels import cubic_shares

@@ -9,12 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from equimorph.arrays import Lanes, Numbers, Some
-from equimorph.equilibria.compiled import Line, Workspace, compiled_steps
 from equimorph.equilibria.curves import Curve, squared_length
 from equimorph.equilibria.events import Events
 from equimorph.equilibria.locate import polish
 from equimorph.equilibria.rare_steps import RareSteps, Rows
-from equimorph.equilibria.steps import Front
+from equimorph.equilibria.steps import Front, Line, Workspace, compiled_steps
 from equimorph.equilibria.trace_options import TraceOptions
 from equimorph.errors import InputError
 from equimorph.marching import kernels, tick_kernels as ticks

@@ -17,8 +17,7 @@ from typing import Any
 import numpy as np
 
 from equimorph.arrays import Float, Int
-from equimorph.errors import InputError
-from equimorph.optional_packages import load_package
+from equimorph.errors import InputError, load_package
 
 Polyline = Float[np.ndarray, "points 3"]
 

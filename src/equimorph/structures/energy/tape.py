@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from equimorph.arrays import Float, Int
-from equimorph.errors import InputError
+from equimorph.errors import InputError, load_package
 from equimorph.linalg.intervals import (
     Interval,
     cosine,
@@ -23,7 +23,6 @@ from equimorph.linalg.intervals import (
 )
 from equimorph.linalg.lanes import over_lanes
 from equimorph.linalg.sparse import SparseLayout
-from equimorph.optional_packages import load_package
 from equimorph.structures.energy.kernels import OPERATIONS, run_lanes
 
 ROUGH = frozenset({

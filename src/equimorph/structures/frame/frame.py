@@ -19,7 +19,7 @@ from equimorph.structures.frame.network import AXES, MemberSpec, SupportSpec, fr
 from equimorph.structures.frame.patterns import Actuators, Loads
 from equimorph.structures.network import Joints
 from equimorph.structures.resolution import SMALLEST_WAVE
-from equimorph.structures.stress import Stressed
+from equimorph.structures.rod.fibres import Stressed
 from equimorph.structures.unit_system import Units, unit_system
 
 

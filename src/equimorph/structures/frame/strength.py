@@ -14,8 +14,7 @@ from equimorph.model import Descriptor, remember_call
 from equimorph.structures.any_network import AnyNetwork
 from equimorph.structures.frame.any_model import AnyFrameModel
 from equimorph.structures.rod.extrema import peaks, stations
-from equimorph.structures.rod.fibres import Fibres
-from equimorph.structures.stress import Stressed
+from equimorph.structures.rod.fibres import Fibres, Stressed
 from equimorph.structures.unit_system import UnitSystem
 
 Nodal = Float[np.ndarray, "lanes elements order"]

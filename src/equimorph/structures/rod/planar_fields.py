@@ -17,10 +17,9 @@ from equimorph.structures.material_points import MaterialPoints
 from equimorph.structures.rod.any_description import RodDescription
 from equimorph.structures.rod.any_rod import AnyRod, Arclengths
 from equimorph.structures.rod.centreline import Centreline
-from equimorph.structures.rod.fibres import Fibres
+from equimorph.structures.rod.fibres import Fibres, Stressed
 from equimorph.structures.rod.mechanics import PlanarMechanics
 from equimorph.structures.rod.terms import Curvature
-from equimorph.structures.stress import Stressed
 from equimorph.structures.unit_system import UnitSystem
 
 FREE = ("stiffness", "curvature", "side_curvature", "natural_twist")

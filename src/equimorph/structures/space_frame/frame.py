@@ -18,12 +18,12 @@ from equimorph.structures.frame.patterns import Actuators, Loads, Patterns
 from equimorph.structures.network import Joints
 from equimorph.structures.newton import newton
 from equimorph.structures.resolution import SMALLEST_IN_SPACE
+from equimorph.structures.rod.fibres import Stressed
 from equimorph.structures.space_frame.fields import SpatialFrameFields
 from equimorph.structures.space_frame.mechanics import SpatialFrameMechanics
 from equimorph.structures.space_frame.member import SpatialMemberSpec, SpatialSupportSpec
 from equimorph.structures.space_frame.model import SpatialFrameModel
 from equimorph.structures.space_frame.network import spatial_network
-from equimorph.structures.stress import Stressed
 from equimorph.structures.unit_system import Units, unit_system
 
 

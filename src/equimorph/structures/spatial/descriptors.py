@@ -20,7 +20,7 @@ from equimorph.structures.rod.fibres import Sizes, Strains
 from equimorph.structures.rod.planar_fields import StressedRod
 from equimorph.structures.spatial.fields import Fields, SpatialFields
 from equimorph.structures.spatial.mechanics import SpatialMechanics
-from equimorph.structures.spatial.orbits import on_orbit
+from equimorph.structures.spatial.natural import on_orbit
 from equimorph.structures.spatial.phase import PinnedMechanics
 from equimorph.structures.states import State
 

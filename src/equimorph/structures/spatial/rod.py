@@ -24,8 +24,12 @@ from equimorph.structures.spatial.descriptors import DescribedInSpace
 from equimorph.structures.spatial.ends import Ends
 from equimorph.structures.spatial.fields import SpatialFields
 from equimorph.structures.spatial.mechanics import SpatialMechanics
-from equimorph.structures.spatial.natural import natural_states, planar_guess
-from equimorph.structures.spatial.orbits import pinned_guess, pinned_natural_states
+from equimorph.structures.spatial.natural import (
+    natural_states,
+    pinned_guess,
+    pinned_natural_states,
+    planar_guess,
+)
 from equimorph.structures.spatial.phase import OrbitMechanics, PinnedMechanics
 from equimorph.structures.states import State
 from equimorph.structures.unit_system import Quantity, Units
