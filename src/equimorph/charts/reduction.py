@@ -1,7 +1,8 @@
 """`reduce`: at most one preferred state over each point, with barriers and gaps.
 
-The preferred part is cut exactly where the preference changes. See docs/decisions.md, "Preferences
-are asked, not modelled".
+The preferred part is cut exactly where the preference changes.
+
+See docs/decisions.md, "Preferences are asked, not modelled".
 """
 
 from collections.abc import Callable

@@ -1,7 +1,8 @@
 """Lanes that march together, one a row of arrays, and steps that need more than the kernels.
 
-Such steps are doubtful ones, and those that may hide events. See docs/decisions.md, "Lanes march in
-compiled kernels".
+Such steps are doubtful ones, and those that may hide events.
+
+See docs/decisions.md, "Lanes march in compiled kernels".
 """
 
 from dataclasses import replace

@@ -47,6 +47,7 @@ Between = Callable[
     tuple[ItemFlags, Vertices],
 ]
 Rows = Int[np.ndarray, " _"]
+SharedEnds = Int[np.ndarray, "_ 2"]
 
 
 @dataclass(frozen=True)
@@ -230,7 +231,7 @@ def _somewhere(
     return good, at.take(np.argsort(order)), t
 
 
-def _crossing_edges(fabric: Fabric) -> tuple[Pairs, Rows]:
+def _crossing_edges(fabric: Fabric) -> tuple[SharedEnds, Rows]:
     """Edges on crossings, of all sheets, in the order of keys that copies of one edge share."""
     facets = fabric.facets[(fabric.marks & FacetMark.CROSSING) > 0]
     if len(facets) == 0 or facets.shape[1] == 1:
@@ -241,7 +242,7 @@ def _crossing_edges(fabric: Fabric) -> tuple[Pairs, Rows]:
     return ends[order], keys[order]
 
 
-def first_copies(fabric: Fabric, ends: Pairs, marks: Rows) -> Bool[np.ndarray, " _"]:
+def first_copies(fabric: Fabric, ends: SharedEnds, marks: Rows) -> Bool[np.ndarray, " _"]:
     """Which edges are no copies of earlier ones."""
     out = np.ones(len(ends), bool)
     own = np.flatnonzero((marks & FacetMark.CROSSING) > 0)
@@ -251,7 +252,7 @@ def first_copies(fabric: Fabric, ends: Pairs, marks: Rows) -> Bool[np.ndarray, "
     return out
 
 
-def copies(fabric: Fabric, ends: Pairs) -> tuple[Rows, Pairs]:
+def copies(fabric: Fabric, ends: SharedEnds) -> tuple[Rows, SharedEnds]:
     """Rows of edges on crossings, and the edges of other sheets that are the same."""
     every, keys = _crossing_edges(fabric)
     if len(every) == 0:
@@ -267,7 +268,7 @@ def copies(fabric: Fabric, ends: Pairs) -> tuple[Rows, Pairs]:
     return row[other & on], found[other & on]
 
 
-def with_copies(fabric: Fabric, ends: Pairs, more: Vertices) -> tuple[Pairs, Vertices]:
+def with_copies(fabric: Fabric, ends: SharedEnds, more: Vertices) -> tuple[SharedEnds, Vertices]:
     """Edges to be cut at vertices, with the copies of those on crossings."""
     row, others = copies(fabric, ends)
     if len(row) == 0:
@@ -285,7 +286,7 @@ def with_copies(fabric: Fabric, ends: Pairs, more: Vertices) -> tuple[Pairs, Ver
     return np.concatenate([ends, others]), whole
 
 
-def duplicates(fabric: Fabric) -> Pairs:
+def duplicates(fabric: Fabric) -> SharedEnds:
     """Edges off the crossings between points that other edges join, too."""
     ends, _ = edges_of(fabric.cells, len(fabric.vertices))
     both = (fabric.vertices.shared[ends] >= 0).all(axis=1)
@@ -296,7 +297,7 @@ def duplicates(fabric: Fabric) -> Pairs:
     return np.asarray(ends[plain & (counts[inverse] > 1)])
 
 
-def _keys(fabric: Fabric, ends: Pairs) -> Rows:
+def _keys(fabric: Fabric, ends: SharedEnds) -> Rows:
     """One number for all edges between the same points."""
     shared = fabric.vertices.shared
     return np.asarray(keys_of(shared[ends] + 1, int(shared.max(initial=0)) + 2))
