@@ -155,8 +155,9 @@ class Question:
     extra: Any = None
 
     def __getitem__(self, name: str) -> Any:
-        """Argument of the task."""
-        return self.values[name]
+        """Argument of the task; states are chosen from the set."""
+        value = self.values[name]
+        return value.on(self.ground) if isinstance(value, Later) else value
 
     @property
     def name(self) -> str:
@@ -202,10 +203,7 @@ class Question:
 
     def _arguments(self, sink: Progress) -> "Arguments":
         """All arguments, with states and constraints of the set."""
-        values = {
-            name: each.on(self.ground) if isinstance(each, Later) else each
-            for name, each in self.values.items()
-        }
+        values = {name: self[name] for name in self.values}
         if self.kind.within_set and not isinstance(values.get("schedule"), Schedule):
             bounds = () if self.eset is None else self.eset.constraints
             values["within"] = tuple(dict.fromkeys((*bounds, *self.within)))

@@ -5,14 +5,13 @@ from collections.abc import Mapping
 from functools import partial
 from html import escape
 from types import MappingProxyType
-from typing import Annotated, NamedTuple
+from typing import Annotated
 
 from pydantic import Field
 
 from equimorph import plotting
 from equimorph.errors import InputError
 from equimorph.plotting.robustness import MOST_BARS
-from equimorph.structures import State
 from equimorph.study import html
 from equimorph.study.lookup import check_parameters
 from equimorph.study.question import Arguments, Figure, Kind, Question, still
@@ -130,42 +129,30 @@ def _in_words(load: str, name: str, law: ImperfectionLaw) -> str:
     return f"limit {load} = {html.number(law.perfect)} {change} ({law.law})"
 
 
-class StateRoom(NamedTuple):
-    """A state and the room around it."""
-
-    state: State
-    room: Room
-
-
-class RoomKind(Kind[StateRoom]):
+class RoomKind(Kind[Room]):
     """How far parameters may stray from a state."""
 
     table = "room"
     tasks = (stable_room,)
     names = MappingProxyType({"states": "state"})
 
-    def answer(self, question: Question, arguments: Arguments) -> StateRoom:
-        """Lift rays from the state."""
-        return StateRoom(arguments["states"], stable_room(**arguments.of(stable_room)))
-
-    def figures(self, question: Question, answer: StateRoom) -> list[Figure]:
+    def figures(self, question: Question, answer: Room) -> list[Figure]:
         """Where it lies, over two parameters."""
-        draw = partial(plotting.room, *answer, question.eset)
+        draw = partial(plotting.room, answer.states[0], answer, question.eset)
         caption = "The room around the state (●) and where it ends (×)."
         two = len(question.section.tolerances) == 2
         return [still(question.files, draw, caption)] if two else []
 
-    def words(self, question: Question, answer: StateRoom) -> str:
+    def words(self, question: Question, answer: Room) -> str:
         """Its size."""
-        room = answer.room
-        size = f"the {question.section.shape} of {html.number(room.least, 6)} tolerances"
-        if room.kind[0] == "arrived":
+        size = f"the {question.section.shape} of {html.number(answer.least, 6)} tolerances"
+        if answer.kind[0] == "arrived":
             return f"{size} is stable, the largest that was tried."
-        return f"stable up to {size}; then {room.kind[0]}."
+        return f"stable up to {size}; then {answer.kind[0]}."
 
-    def details(self, question: Question, answer: StateRoom) -> list[str]:
+    def details(self, question: Question, answer: Room) -> list[str]:
         """Its sides."""
-        box = answer.room.boxes[0]
+        box = answer.boxes[0]
         rows = [
             [escape(name), html.number(low, 6), html.number(high, 6)]
             for name, low, high in zip(box.names, box.lower, box.upper, strict=True)

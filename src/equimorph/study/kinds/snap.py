@@ -4,7 +4,6 @@ from dataclasses import replace
 from functools import partial
 from html import escape
 from types import MappingProxyType
-from typing import NamedTuple
 
 import numpy as np
 from pydantic import Field
@@ -12,7 +11,7 @@ from pydantic import Field
 from equimorph import plotting
 from equimorph.manifold import Snap, SnapGraph, snap_graph
 from equimorph.model import Descriptor, names_of
-from equimorph.structures import State, States, join_states
+from equimorph.structures import States, join_states
 from equimorph.study import html
 from equimorph.study.answers import count_of, figures_of_states, table_of_states
 from equimorph.study.lookup import descriptor_at
@@ -30,59 +29,43 @@ CAPTION = (
 )
 
 
-class StateSnap(NamedTuple):
-    """A state and the least snap from it."""
-
-    state: State
-    snap: LeastSnap
-
-
-class SnapKind(Kind[StateSnap]):
+class SnapKind(Kind[LeastSnap]):
     """The least change of parameters that makes a state snap, and where it lands."""
 
     table = "snap"
     tasks = (least_snap,)
 
-    def answer(self, question: Question, arguments: Arguments) -> StateSnap:
-        """Find the least change."""
-        return StateSnap(arguments["state"], least_snap(**arguments.of(least_snap)))
-
-    def figures(self, question: Question, answer: StateSnap) -> list[Figure]:
+    def figures(self, question: Question, answer: LeastSnap) -> list[Figure]:
         """State, fold and landing on the plane."""
-        return figures_of_states(question, _stations(answer))
+        return figures_of_states(question, _stations(question, answer))
 
-    def words(self, question: Question, answer: StateSnap) -> str:
+    def words(self, question: Question, answer: LeastSnap) -> str:
         """Change and landing."""
-        snap = answer.snap
-        assert snap.landing is not None
-        moves = ", ".join(f"{name} by {value:+.6g}" for name, value in snap.change.items())
-        end, least = snap.landing, f" ({snap.why})" if snap.why else ""
+        assert answer.landing is not None
+        moves = ", ".join(f"{name} by {value:+.6g}" for name, value in answer.change.items())
+        end, least = answer.landing, f" ({answer.why})" if answer.why else ""
         released = f"{end.released:.4g} released{least}"
         return f"the least way to a snap is {moves}; {end.status}, {released}."
 
-    def details(self, question: Question, answer: StateSnap) -> list[str]:
+    def details(self, question: Question, answer: LeastSnap) -> list[str]:
         """A table of state, fold and landing."""
-        states = _stations(answer)
+        states = _stations(question, answer)
         more = {
             "": ["state", "edge of stability", "landing"][: len(states)],
-            **{
-                each: [html.number(value, 6) for value in states[each]]
-                for each in answer.snap.change
-            },
+            **{each: [html.number(value, 6) for value in states[each]] for each in answer.change},
         }
         return table_of_states(states, [states.structure.elevation], more)
 
-    def refusal(self, question: Question, answer: StateSnap) -> str:
+    def refusal(self, question: Question, answer: LeastSnap) -> str:
         """Reason why no snap was found."""
         del question
-        return "" if answer.snap.landing is not None else answer.snap.why
+        return "" if answer.landing is not None else answer.why
 
 
-def _stations(answer: StateSnap) -> States:
+def _stations(question: Question, answer: LeastSnap) -> States:
     """State, fold and landing."""
-    state, snap = answer
-    further = () if snap.states is None else (snap.states,)
-    return join_states(state.structure, (state, *further))
+    further = () if answer.states is None else (answer.states,)
+    return join_states(question.structure, (question["state"], *further))
 
 
 class SnapGraphKind(Kind[Snaps]):
