@@ -4,6 +4,7 @@ A fold curve is smooth in the configurations and the parameters, so that the she
 of it, but for cusps, at which it turns back in the parameters.
 """
 
+from collections.abc import Sequence
 from itertools import combinations
 from typing import NamedTuple
 
