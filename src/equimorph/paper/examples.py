@@ -1,87 +1,12 @@
-"""The examples of the reproduction, in the order of the article, with their figures.
-
-Of the constrained spring everything is known in closed form: F = k (1 − x_l/cos δ) sin δ, stable
-where x_l > cos³ δ.
-"""
+"""The examples of the reproduction, in the order of the article, with their figures."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
-import numpy as np
-from matplotlib.axes import Axes
-
-import equimorph as em
 from equimorph.paper import arch_maps, in_space, shape_control
-
-SPRING, ROD = {"x_l": 0.8, "F": 0.02}, {"Theta": 0.9, "Delta": 0.15}
-"""Settings of the structures that are drawn; the rod under the left-half load."""
-THIN: dict[str, Any] = {"color": "#1a1a1a", "linewidth": 0.6}
-DASHED = THIN | {"linestyle": (0, (5, 3)), "zorder": 0.5}
-COIL = 0.035 * np.array([0.0, 0.0, *np.tile([1.0, -1.0], 7), 0.0, 0.0])
-"""Distances of the corners of the coil from its axis."""
-START = {"delta": 0.62, "x_l": 0.80}
-LEVELS = (-0.1, -0.05, -0.02, 0.0, 0.02, 0.05, 0.1)
-"""Loads F of the level curves that are drawn, in units of k."""
-SMOOTH = 1e-3
-"""Distance of the surface from its triangles up to which lines on it look smooth at its cusp."""
-
-
-def spring(folder: Path, accuracy: float = SMOOTH) -> dict[str, float]:
-    """Answer the tasks of the article from C_s, at the load of C_s."""
-    spring = em.Spring()
-    angle, load, length = spring.angle, em.value_of(spring, "F"), em.value_of(spring, "x_l")
-    within = [angle <= 1.2, angle >= -1.2]
-    slice_ = em.equilibrium_set(spring, em.Box(F=(-0.1, 0.1)), fixed={"x_l": 0.8}, within=within)
-    eset = em.equilibrium_set(
-        spring, em.Box(x_l=(0.5, 1.2), F=(-0.25, 0.25)), within=within, intervals=(35, 35),
-        accuracy=accuracy,
-    )  # fmt: skip
-    known = {angle: START["delta"], length: START["x_l"]}
-    start = em.solve_shape(eset, known).stable[0]
-    level = [load <= start["F"], load >= start["F"]]
-    first = em.solve_shape(eset, {angle: 0.40, load: start["F"]}, start=start, within=level)
-    exact = em.solve_shape(eset, {angle: 0.40, length: 0.90}).stable[0]
-    at_level = em.equilibrium_set(spring, em.Box(x_l=(0.5, 1.2)), fixed={"F": start["F"]})
-    flattest = em.optimise(at_level, angle, start=start).best.state
-    mirrored = em.solve_shape(eset, {angle: -0.62, load: start["F"]}).stable[0]
-    fixed_load = em.plan(at_level, start, mirrored)
-    free_load = em.plan(eset, start, mirrored)
-    cusp = em.manifold.cusps(eset).states[0]
-    printed = em.solve_shape(eset, {angle: 0.30, length: 0.925}).stable[0]
-    marks = {"$C_s$": start, "$C_t^1$": first.stable[0], "$C_t^2$": flattest, "$C_t^3$": mirrored}
-    plots = em.plotting
-    plots.save(plots.diagram(slice_, angle), folder, "spring-equilibria")
-    plots.save(plots.surface(eset, angle, route=free_load), folder, "spring-set")
-    levels = plots.level_plane(
-        eset, (length, angle), load, (*LEVELS, start["F"]), route=free_load, marks=marks
-    )
-    plots.save(levels, folder, "spring-levels")
-    assert free_load.path is not None
-    return {
-        "load of C_s": start["F"],
-        "x_l of delta = 0.40 at the load of C_s": first.stable[0]["x_l"],
-        "load of (0.40, 0.90)": exact["F"],
-        "load of (0.30, 0.925)": printed["F"],
-        "margin of (0.30, 0.925)": printed.margin,
-        "delta of C_t2": angle(flattest),
-        "x_l of C_t2": flattest["x_l"],
-        "x_l of C_t3 at the load of C_s": mirrored["x_l"],
-        "a route to C_t1 at fixed load": len(first.stable) > 0,
-        "a route to C_t3 at fixed load": fixed_load.arrived,
-        "a route to C_t3 with the load free": free_load.arrived,
-        "largest x_l on that route": float(free_load.path.states["x_l"].max()),
-        "x_l of the cusp": cusp["x_l"],
-        "free parameters of the set": float(len(eset.names)),
-    }
-
-
-def models(folder: Path) -> dict[str, float]:
-    """Draw both structures; there is nothing to compute."""
-    em.plotting.save(_spring_model(), folder, "spring-model")
-    em.plotting.save(_rod_model(), folder, "rod-model")
-    return {}
+from equimorph.paper.models import models
+from equimorph.paper.spring import spring
 
 
 @dataclass(frozen=True)
@@ -262,60 +187,3 @@ EXAMPLES = (
         },
     ),
 )
-
-
-def _spring_model() -> Axes:
-    """Draw the spring from its actuator A to the loaded roller B."""
-    state = max(em.find_equilibria(em.Spring(), SPRING).stable, key=lambda each: each.z[0])
-    ax = em.plotting.portraits(state.batch, [" "])
-    ax.lines[-1].set_visible(False)
-    (a, b), angle = state.shape(), float(state.z[0])
-    along = (b - a) / np.linalg.norm(b - a)
-    across, side = np.array([along[1], -along[0]]), np.sign(b[0] - a[0])
-    shares = np.array([0.0, *np.linspace(0.25, 0.75, len(COIL) - 2), 1.0])
-    coil = a + shares[:, None] * (b - a) + COIL[:, None] * across
-    ax.plot(*coil.T, color="#1f5f99", linewidth=1.4, zorder=3)
-    ax.plot([0.0, 0.0, a[0]], [1.35 * b[1], 0.0, 0.0], **DASHED)
-    _mark_angle(ax, a, side, angle, 0.18, "δ")
-    measure(ax, a[0], -0.14, "$x_l$")
-    middle = 0.5 * (a + b) + 0.08 * across * np.sign(across[1])
-    for text, place, right, up in (
-        ("A", a, -0.05, 0.05), ("B", b, -0.04, 0.05), ("$F$", b, 0.03, 0.12), ("$k$", middle, 0, 0)
-    ):  # fmt: skip
-        ax.text(place[0] + right * side, place[1] + up, text, ha="center", va="center", size=8)
-    ax.set(ylim=(-0.22, 1.4 * b[1]))
-    ax.set_axis_off()
-    return ax
-
-
-def _rod_model() -> Axes:
-    """Draw the rod between its rotary actuators under a load that covers half of it."""
-    path = em.lift(em.Rod("left-half").natural_state(**ROD), {"q": 1.0})
-    ax, shape = em.plotting.portraits(path.states[-1:], [" "]), path.end.state.shape()
-    for name, place, side in (("A", shape[0], 1.0), ("B", shape[-1], -1.0)):
-        angle = ROD["Theta"] + side * ROD["Delta"]
-        ax.plot([place[0], place[0] + 0.24 * side], [0.0, 0.0], **DASHED)
-        _mark_angle(ax, place, side, angle, 0.13, f"$\\theta_{name}$")
-        ax.text(place[0] - 0.09 * side, 0.0, name, ha="center", va="center", size=8)
-    measure(ax, shape[-1, 0], -0.1, "$ν L$")
-    for at, gap, text in ((0.2, np.array([-0.12, 0.12]), "$q\\,Q(s)$"), (0.75, 0.03, "$s$")):
-        x, y = shape[int(at * len(shape))] + gap
-        ax.text(x, y, text, ha="center", va="center", size=8)
-    ax.set(ylim=(-0.17, ax.get_ylim()[1]))
-    ax.set_axis_off()
-    return ax
-
-
-def _mark_angle(ax: Axes, place: Any, side: float, angle: float, radius: float, text: str) -> None:
-    """Draw the arc of an angle above the horizontal, with its symbol."""
-    turn = np.linspace(0.0, angle, 30)
-    ax.plot(place[0] + radius * side * np.cos(turn), place[1] + radius * np.sin(turn), **THIN)
-    x, y = 1.3 * radius * np.cos(angle / 2), 1.3 * radius * np.sin(angle / 2)
-    ax.text(place[0] + side * x, place[1] + y, text, ha="center", va="center", size=8)
-
-
-def measure(ax: Axes, x: float, y: float, text: str) -> None:
-    """Draw a dimension line from x = 0, with its symbol below."""
-    look = {"arrowstyle": "<|-|>,head_width=0.12,head_length=0.3", "shrinkA": 0, "shrinkB": 0}
-    ax.annotate("", (x, y), (0.0, y), arrowprops={**look, **THIN})
-    ax.text(0.5 * x, y - 0.04, text, ha="center", va="center", size=8)
