@@ -111,3 +111,13 @@ def test_straight_rods_with_whole_turns_more_are_found():
         twist = 0.5 + 4.0 * np.pi * turns
         straight = 0.7 * twist**2 / (8.0 * np.pi**2) + 0.5 * 6.0 * 0.17**2
         assert np.abs(energies - straight).min() < 1e-8
+
+
+def test_searches_begin_from_straight_rods_with_whole_turns():
+    """All three with 4π more or less; those with 8π are not resolved. Energies as above."""
+    rod, _, _ = coaxial(elements=12, degree=5)
+    at = {"twist_A": 0.1, "twist_B": 0.6, "P": 0.0, "nu": 0.83}
+    energies = em.find_equilibria(rod, at, within=[rod.max_curvature <= 3.0]).energy
+    twists = 0.5 + 4.0 * np.pi * np.arange(-1, 2)
+    straight = 0.7 * twists**2 / (8.0 * np.pi**2) + 0.5 * 6.0 * 0.17**2
+    np.testing.assert_allclose(np.abs(energies[:, None] - straight).min(axis=0), 0.0, atol=1e-7)

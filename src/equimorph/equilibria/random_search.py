@@ -104,11 +104,14 @@ class Pools:
         group = np.repeat(np.arange(len(self.ground.p)), guesses)
         p = self.ground.p[group]
         guess = structure.sample(p, self.generator)
+        number = np.arange(len(group)) % guesses
+        for k, special in enumerate(structure.special_guesses(self.ground.p)[:guesses]):
+            good = structure.resolved(special, self.ground.p)
+            guess[np.flatnonzero(number == k)[good]] = special[good]
         near = settle(structure, guess, p, guards=Guards(iterations=40))
         found = near.found
         self.failures.append(("Newton did not converge", group[~found]))
         self._take(near.z[found], group[found])
-        number = np.arange(len(group)) % guesses
         again = ~found & (number < np.ceil(HOMOTOPIES * guesses))
         self._by_homotopy(guess[again], group[again])
         self._by_deflation(np.arange(len(self.z)), NUDGE)

@@ -167,6 +167,10 @@ class Pushed(Structure):
         """Guesses of the structure."""
         return self._base.sample(self._own(p), generator)
 
+    def special_guesses(self, p: Parameters) -> Float[np.ndarray, "guesses lanes size"]:
+        """Guesses of the structure to which random ones rarely lead."""
+        return self._base.special_guesses(self._own(p))
+
     def resolved(self, z: Lanes, p: Parameters) -> Flags:
         """Whether the structure's discretisation represents states."""
         return self._base.resolved(z, self._own(p))

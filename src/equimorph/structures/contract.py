@@ -209,6 +209,10 @@ class Structure(Rebuilt, Inertial):
     def sample(self, p: Parameters, generator: np.random.Generator) -> Lanes:
         """Random guesses, one per lane, spread over what equilibria may look like."""
 
+    def special_guesses(self, p: Parameters) -> Float[np.ndarray, "guesses lanes size"]:
+        """Guesses to which random ones rarely lead, several per lane; by default there are none."""
+        return np.zeros((0, len(p), self.size))
+
     @abstractmethod
     def resolved(self, z: Lanes, p: Parameters) -> Flags:
         """Whether states lie within what the discretisation can represent."""

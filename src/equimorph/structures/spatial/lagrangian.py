@@ -37,6 +37,8 @@ LENGTH_STIFFNESS = 100.0
 on the rotations; margins of states are known below it."""
 LARGEST_TAIL = 5e-4
 """Highest Legendre coefficients of q, half of radians, of an element that represents its part."""
+WHOLE_TURNS = np.array([0.0, -1.0, 1.0, -2.0, 2.0])
+"""Turns by 4π of guesses, which clamps do not see."""
 FORCES = 8.0
 """Spread of the support forces of random guesses."""
 
@@ -248,6 +250,21 @@ class SpatialLagrangian(RodMechanics):
         s = self.mesh.nodes[:, None]
         angles = ends[:, :1] * (1.0 - s) + ends[:, 1:] * s
         return np.asarray(clamp_rotation(angles[None])[0])
+
+    def with_whole_turns(self, p: Parameters) -> Float[np.ndarray, "guesses lanes size"]:
+        """Rotations `between` the clamps, with turns about the tangent that the clamps do not see.
+
+        By 4π: a turn by 2π changes the sign of the quaternion of a clamp. Between coaxial clamps
+        these are straight, and equilibria of round rods.
+        """
+        turns = np.zeros((len(WHOLE_TURNS), 1, len(self.mesh.nodes), 3))
+        turns[:, 0, :, 0] = 4.0 * np.pi * WHOLE_TURNS[:, None] * self.mesh.nodes
+        if not all(self.model.held):
+            turns = turns[:0]
+        q = product(self.between(p)[None], exponential(turns))[:, :, self.model.unknown_nodes]
+        out = np.zeros((len(turns), len(p), self.size))
+        out[:, :, : self.unknowns] = q.reshape(len(turns), len(p), self.unknowns)
+        return out
 
     def guess_for(self, finer: Any, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes finer"]:
         """States as guesses of those of the same rod with other elements."""

@@ -31,7 +31,7 @@ from equimorph.structures.spatial.phase_condition import (
     phase_weight,
     with_phase_condition,
 )
-from equimorph.structures.spatial.quaternions import Jet, exponential, product
+from equimorph.structures.spatial.quaternions import Jet
 from equimorph.structures.spatial.step_kernels import advance_lanes
 
 ON_AXIS = 1e-10
@@ -41,10 +41,6 @@ NEAR_AXIS = 1e-12
 NEAR_PAIR, INVERSE, RAYLEIGH = 1e-7, 3, 2
 """Distance from an eigenvalue at which inverse iteration looks for it: nearer, round-off parts the
 pair and turns its mode; steps of it near zero, and then near the quotient, which cube the error."""
-STRAIGHT = 0.2
-"""Share of the random guesses that are nearly straight."""
-BESIDE = 1e-2
-"""Half the angles by which these are off the axis, on which the condition is void."""
 NO_FORCE = 1e-8
 """Multiplier of the phase condition that is none, in units of 4π²B/L²."""
 
@@ -57,21 +53,6 @@ class PinnedMechanics(SpatialMechanics):
         across = slice(2, self.unknowns, 4), slice(3, self.unknowns, 4)
         square = sum(z[:, each] ** 2 @ self.mass[each] for each in across)
         return np.asarray(square < ON_AXIS**2)
-
-    def sample(self, p: Parameters, generator: np.random.Generator) -> Lanes:
-        """Random guesses, some of them nearly straight, with whole turns of 4π of both signs.
-
-        Newton's method rarely leads to the axis from farther beside it.
-        """
-        z = super().sample(p, generator)
-        some = np.flatnonzero(generator.random(len(z)) < STRAIGHT)
-        turns = BESIDE * generator.normal(size=(len(some), len(self.mesh.nodes), 3))
-        links = generator.integers(-1, 2, len(some))[:, None]
-        turns[..., 0] = 2.0 * np.pi * links * self.mesh.nodes
-        q = product(self.between(p[some]), exponential(turns))[:, self.model.unknown_nodes]
-        z[some, : self.unknowns] = q.reshape(len(some), self.unknowns)
-        z[some, self.unknowns :] = 0.0
-        return z
 
     def equations(self, z: Lanes, p: Parameters, *directions: Direction, mixed: bool = True) -> Jet:
         """F with its derivatives along none, one or two directions, and the mixed one if asked."""

@@ -302,6 +302,10 @@ class SpatialRod(DescribedInSpace):
         rod = self.mechanics
         return rod.have_orbits(p) if isinstance(rod, OrbitMechanics) else np.zeros(len(p), bool)
 
+    def special_guesses(self, p: Parameters) -> Float[np.ndarray, "guesses lanes size"]:
+        """Rods that turn evenly from one clamp to the other, with whole turns more or less."""
+        return self.mechanics.with_whole_turns(p)
+
     def along_orbits(self, z: Lanes, p: Parameters) -> Lanes:
         """Rates at which states off the x axis turn about it, where they may for nothing."""
         return self.mechanics.along_orbits(z, p)
