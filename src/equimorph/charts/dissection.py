@@ -235,13 +235,15 @@ def _start_at_cusp(
     clear: Walker, free: Walker, cells: Cells, path: list[int], cusps: tuple[int, ...]
 ) -> list[int]:
     """The path from the cusp next to its beginning on, if it sees one of its first vertices."""
-    around = np.array([path[0]])
-    for _ in range(RINGS):
-        around = np.unique(cells.corners[np.isin(cells.corners, around).any(axis=1)])
-    near = [cusp for cusp in cusps if cusp in around and cusp != path[0]]
-    if not near or path[0] in cusps:
+    if not cusps or path[0] in cusps:
         return path
-    place = clear.places
+    place, corners = clear.places, cells.corners
+    around = np.arange(len(place)) == path[0]
+    for _ in range(RINGS):
+        around[corners[around[corners].any(axis=1)]] = True
+    near = [cusp for cusp in cusps if around[cusp]]
+    if not near:
+        return path
     cusp = min(near, key=lambda c: float(np.linalg.norm(place[c] - place[path[0]])))
     # next to a cusp all cells lie over other cells
     for walker in (clear, free):
