@@ -8,7 +8,7 @@ from equimorph.manifold.complex.description import beyond_bounds
 from equimorph.manifold.geometry.points import VertexKind
 from oracles import specimens
 from oracles.complexes import assert_faithful
-from oracles.specimens import toggle
+from oracles.specimens import portal, toggle
 from typecheck import unchecked
 
 
@@ -212,3 +212,15 @@ def test_cells_with_a_vertex_beyond_a_bound_are_wrong():
     assert 0 < beyond.sum() < len(beyond)
     np.testing.assert_array_equal(beyond_bounds(free.points, free.cells, (bound,)), beyond)
     assert not beyond_bounds(held.points, held.cells, (bound,)).any()
+
+
+@pytest.mark.slow
+def test_cells_turned_over_beside_a_bound_are_divided_where_sheets_cross_elsewhere():
+    """A thin cell between the side of the box and the bound, which bends; crossings lie apart."""
+    frame = portal(50.0).resolving(2.19)
+    eset = em.equilibrium_set(
+        frame, em.Box(k=(-0.6318, 0.3583), d=(-0.1905, -0.1605)), fixed={"P": 0.0, "q": 0.6662},
+        within=[frame.max_curvature <= 2.19], intervals=(13, 15),
+    )  # fmt: skip
+    assert len(eset.crossings)
+    assert eset.audit.clean, eset.audit

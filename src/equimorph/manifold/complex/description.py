@@ -22,6 +22,7 @@ from equimorph.manifold.geometry.setting import Setting
 from equimorph.manifold.geometry.topology import (
     PAIR,
     Adjacency,
+    Senses,
     adjacency,
     count_unbalanced,
     cut_at_crossings,
@@ -263,12 +264,8 @@ def _audit(
 ) -> Audit:
     corners, cell_index, points = given.cells, given.cell_index, given.points
     coordinates = points.p[:, setting.free]
-    # of parts of sets two cells may be left at a crossing that belong to different sheets
-    if crossed.any():
-        cells, origin = cut_at_crossings(corners, whole.facets[crossed], len(points))
-        sense = senses(cells, cell_index, coordinates[origin], adjacency(cells))
-    else:
-        sense = senses(corners, cell_index, coordinates, whole, component)
+    crossings = whole.facets[crossed]
+    sense = _senses(corners, cell_index, coordinates, crossings, whole, component)
     edges = len(whole.facets) if whole.facets.shape[1] == PAIR else None
     wrong = overturned_off_folds(
         given.kinds, corners, sense.overturned, coordinates / setting.scales
@@ -299,19 +296,38 @@ def _audit(
     )
 
 
+def _senses(
+    cells: Cells,
+    cell_index: CellNumbers,
+    coordinates: Float[np.ndarray, "V d"],
+    crossings: Int[np.ndarray, "crossed d"],
+    whole: Adjacency,
+    component: CellNumbers,
+) -> Senses:
+    """Senses of cells, parted at crossings: there two cells may belong to different sheets."""
+    if len(crossings) == 0:
+        return senses(cells, cell_index, coordinates, whole, component)
+    parted, origin = cut_at_crossings(cells, crossings, len(coordinates))
+    return senses(parted, cell_index, coordinates[origin], adjacency(parted))
+
+
 def overturned_cells(eset: EquilibriumSet) -> CellFlags:
     """Return which cells project against the orientation that their index demands."""
     whole = adjacency(eset.cells)
     return senses(eset.cells, eset.cell_index, eset.coordinates, whole).overturned
 
 
-def wrong_cells(eset: EquilibriumSet) -> CellFlags:
-    """Return which cells of a set without crossings `Audit.wrong` counts."""
+def wrong_off_crossings(eset: EquilibriumSet) -> CellFlags:
+    """Return which cells `Audit.wrong` counts, but for those with a vertex on a crossing."""
     coordinates, scales = eset.coordinates, eset.setting.scales
-    sense = senses(eset.cells, eset.cell_index, coordinates, adjacency(eset.cells), eset.component)
+    crossings, whole = facets_of(eset.crossings, len(eset.names)), adjacency(eset.cells)
+    sense = _senses(eset.cells, eset.cell_index, coordinates, crossings, whole, eset.component)
     off = overturned_off_folds(eset.kinds, eset.cells, sense.overturned, coordinates / scales)
     of_index = contradictions(eset.points, eset.kinds, eset.cells, eset.cell_index)
-    return np.asarray(of_index | off | beyond_bounds(eset.points, eset.cells, eset.constraints))
+    wrong = of_index | off | beyond_bounds(eset.points, eset.cells, eset.constraints)
+    crossed = np.zeros(len(eset.points), bool)
+    crossed[crossings] = True
+    return np.asarray(wrong & ~crossed[eset.cells].any(axis=1))
 
 
 SLIVER = 0.03
