@@ -8,8 +8,8 @@ from hypothesis import Phase, example, given, settings, strategies as st
 
 import equimorph as em
 from equimorph.equilibria import ParameterLine, TraceOptions, trace
+from equimorph.equilibria.determinants import may_vanish
 from equimorph.equilibria.hidden_events import with_hidden_events
-from equimorph.equilibria.inside_steps import may_vanish
 from equimorph.equilibria.trace_options import EventCode
 from oracles.polynomial import Polynomial, slaved
 from typecheck import unchecked

@@ -3,24 +3,22 @@
 It is the cubic through its values and slopes (``dσ/ds = vᵀ D²F[v, T]`` with the unit eigenvector
 v). Points are added until it is known that it does not reach zero, or where.
 
-Where the eigenvalue has to be looked at is said by the determinant of F_z, which costs one
-factorisation: whether it may touch zero, or cross it twice. See docs/decisions.md, "Hidden events".
+See docs/decisions.md, "Hidden events".
 """
 
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from equimorph.arrays import Bool, Flags, Float, Lanes, Numbers, Parameters, Some
+from equimorph.arrays import Flags, Float, Lanes, Numbers, Some
 from equimorph.columns import Columns
 from equimorph.equilibria.critical import Critical, null_border
-from equimorph.equilibria.curves import Curve, ParameterLine, squared_length
+from equimorph.equilibria.curves import Curve, squared_length
+from equimorph.equilibria.determinants import determinant, may_vanish
 from equimorph.equilibria.events import Events, locate_all
 from equimorph.equilibria.locate import hermite
 from equimorph.equilibria.steps import Bracket, Front, least_inside, step_along
 from equimorph.equilibria.trace_options import EventCode, TraceOptions
-from equimorph.marching.kernels import EARLY_DIP, EARLY_NEAR
-from equimorph.structures import Structure
 
 Values = Float[np.ndarray, " points"]
 CLOSE = 0.1
@@ -36,11 +34,6 @@ SHARP = 1e-6
 touches zero: round-off, relative to the largest eigenvalues, hides what lies between."""
 TRIALS = 30
 """Largest number of points inside a step at which the eigenvalue nearest to zero is computed."""
-Trio = Float[np.ndarray, "3 steps"]
-"""Places inside steps, as shares in order, or values there."""
-LOOKS, APART, NEARLY_ZERO = 4, 0.05, 1e-3
-"""Parabolas that lead to the least determinant inside a step; distance between places where it is
-computed, as a share; value, relative to the smaller one at the ends, that counts as zero."""
 
 
 @dataclass(frozen=True)
@@ -299,77 +292,3 @@ def step_between(lane: Some, pair: tuple[Probe, Probe]) -> Bracket:
     flipped = np.sign(low.front.tangent_t) != np.sign(high.front.tangent_t)
     code = np.where(flipped, EventCode.FOLD, EventCode.BRANCH_POINT)
     return Bracket(lane, low.front, high.front, high.length - low.length, low.length, code)
-
-
-def determinants(structure: Structure, z: Lanes, p: Parameters) -> Values:
-    """Determinant of F_z at some states, nan where it costs more than the solution."""
-    return determinant(ParameterLine(structure, p, np.zeros_like(p)), z, np.zeros(len(z)))
-
-
-def determinant(curve: Curve, z: Lanes, t: Values) -> Values:
-    """Determinant of F_z."""
-    still, one, none = np.zeros_like(z), np.ones(len(z)), np.zeros(len(z))
-    return curve.advance(np.ascontiguousarray(z), t, still, one, none).determinant
-
-
-def may_vanish(values: Float[np.ndarray, "3 steps"]) -> Bool[np.ndarray, " steps"]:
-    """Whether what has such values at start, middle and end may touch zero or cross it twice."""
-    start, middle, end = np.sign(values[0]) * values
-    bow, slope = start + end - 2.0 * middle, end - start
-    with np.errstate(divide="ignore", invalid="ignore"):
-        least = middle - slope * (slope / (8.0 * bow))  # a determinant's square may overflow
-    dips = (np.abs(slope) < 2.0 * bow) & (least < EARLY_DIP * np.minimum(start, end))
-    low = np.minimum(start, end) < EARLY_NEAR * middle
-    return np.asarray(dips | low | (middle < EARLY_NEAR * np.minimum(start, end)))
-
-
-def hides_two_zeros(curve: Curve, step: Bracket) -> Bool[np.ndarray, " steps"]:
-    """Whether the determinant of F_z, of one sign at both ends of a step, vanishes twice inside.
-
-    Parabolas through three of its values lead to where it is least. Where that is nearly zero
-    counts, too.
-    """
-    count = len(step.lanes)
-    ends = [determinant(curve, front.z, front.t) for front in (step.before, step.after)]
-    size = np.minimum(*np.abs(ends))
-
-    def value(lanes: Some, share: Values) -> Values:
-        at = determinant(curve.take(lanes), *hermite(step.take(lanes), share))
-        return np.asarray(np.sign(ends[0][lanes]) * at / size[lanes])
-
-    with np.errstate(divide="ignore", invalid="ignore"):
-        middle = value(np.arange(count), np.full(count, 0.5))
-        values = np.stack([np.abs(ends[0]) / size, middle, np.abs(ends[1]) / size])
-    lanes = np.flatnonzero(may_vanish(values))
-    places, values = np.array([[0.0], [0.5], [1.0]]).repeat(len(lanes), 1), values[:, lanes]
-    for _ in range(LOOKS):
-        least = _least_of_parabola(places, values)
-        found = value(lanes, least)
-        places, values = _around_least(places, values, least, found)
-    out = np.zeros(count, bool)
-    out[lanes] = values[1] < NEARLY_ZERO
-    return out
-
-
-def _least_of_parabola(places: Trio, values: Trio) -> Values:
-    """Where the parabola through three values is least, away from their places."""
-    (a, m, b), (f, g, h) = places, values
-    left, right = (g - f) / (m - a), (h - g) / (b - m)
-    bow = (right - left) / (b - a)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        least = 0.5 * (a + m - left / bow)
-    least = np.where(bow > 0.0, least, np.where(f < h, a, b))
-    away = APART * (b - a)
-    least = np.where(np.abs(least - m) < away, m + np.where(m - a > b - m, -away, away), least)
-    return np.asarray(np.clip(least, a + away, b - away))
-
-
-def _around_least(places: Trio, values: Trio, place: Values, value: Values) -> tuple[Trio, Trio]:
-    """The least of three values and one more, and its neighbours on both sides."""
-    all_places, all_values = np.vstack([places, place]), np.vstack([values, value])
-    order = np.argsort(all_places, axis=0)
-    all_places = np.take_along_axis(all_places, order, 0)
-    all_values = np.take_along_axis(all_values, order, 0)
-    least = 1 + np.argmin(all_values[1:3], axis=0)
-    near = least + np.array([[-1], [0], [1]])
-    return np.take_along_axis(all_places, near, 0), np.take_along_axis(all_values, near, 0)

@@ -12,7 +12,8 @@ from equimorph.arrays import Lanes, Numbers, Some
 from equimorph.equilibria.curves import Curve, squared_length
 from equimorph.equilibria.events import Events
 from equimorph.equilibria.locate import polish
-from equimorph.equilibria.rare_steps import RareSteps, Rows
+from equimorph.equilibria.rare_steps import RareSteps
+from equimorph.equilibria.rows import Rows
 from equimorph.equilibria.steps import Front, Line, Workspace, compiled_steps
 from equimorph.equilibria.trace_options import TraceOptions
 from equimorph.errors import InputError

@@ -20,7 +20,7 @@ import numpy as np
 
 from equimorph.arrays import Flags, Items, Lanes, Numbers, Values
 from equimorph.columns import Columns
-from equimorph.equilibria.inside_steps import hides_two_zeros
+from equimorph.equilibria.determinants import hides_two_zeros
 from equimorph.equilibria.steps import Bracket, Front, least_inside
 from equimorph.errors import InputError
 from equimorph.linalg.lanes import over_lanes

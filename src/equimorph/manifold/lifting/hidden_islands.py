@@ -16,7 +16,7 @@ import numpy as np
 
 from equimorph.arrays import Cells, Float, ItemValues
 from equimorph.columns import Columns
-from equimorph.equilibria.inside_steps import determinants
+from equimorph.equilibria.determinants import determinants
 from equimorph.equilibria.settle import Guards, free_directions, settle
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.manifold.geometry.points import are_singular
