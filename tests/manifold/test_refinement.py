@@ -17,8 +17,9 @@ from equimorph.manifold.complex.marked_complex import Fabric, FacetMark, _bisect
 from equimorph.manifold.geometry.simplices import volumes
 from equimorph.manifold.geometry.topology import adjacency, chains, euler_characteristic
 from equimorph.manifold.queries.cusps import with_cusps_beside
-from equimorph.manifold.refining.bisect import follow_edge, patch_around
+from equimorph.manifold.refining.bisect import follow_edge
 from equimorph.manifold.refining.deviation import Memory
+from equimorph.manifold.refining.patches import patch_around
 from equimorph.manifold.refining.quality import qualities_near, smallest_angle, smallest_angles
 from equimorph.manifold.refining.refill import flip, refill, repeat
 from equimorph.manifold.refining.vertex_stars import moves

@@ -324,7 +324,7 @@ def _welded(whole: Complex, same: Pairs) -> Complex:
     )  # fmt: skip
 
 
-def _facets(cells: Facets) -> Facets:
+def _facets(cells: Int[np.ndarray, "cells corners"]) -> Facets:
     """All facets of some cells."""
     return np.concatenate([np.delete(cells, k, axis=1) for k in range(cells.shape[1])])
 

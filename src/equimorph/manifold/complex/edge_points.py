@@ -81,25 +81,34 @@ def unmet(fabric: Fabric, tried: Sequence[Tried]) -> list[Tried]:
 
     Where cells are too coarse, an edge may lead over another vertex, which its middle finds again.
     """
+    met = _met(fabric, [vertices for _, vertices in tried])
+    out = []
+    for (found, vertices), own in zip(tried, met, strict=True):
+        kept = found.copy()
+        kept[found] = ~own
+        out.append((kept, vertices.take(np.flatnonzero(~own))) if own.any() else (found, vertices))
+    return out
+
+
+def _met(fabric: Fabric, parts: Sequence[Vertices]) -> list[ItemFlags]:
+    """Which vertices of each part are in use already."""
+    sizes = [len(part) for part in parts]
+    out, cuts = np.zeros(sum(sizes), bool), np.cumsum(sizes)
+    if len(out) == 0:
+        return np.split(out, cuts[:-1])
     used = np.zeros(len(fabric.vertices), bool)
     used[fabric.cells] = True
-    known = np.flatnonzero(used)
-    place = fabric.vertices.place
-    key = place[known][:, MET] @ WEIGHTS
-    order = np.argsort(key)
-    known, key = known[order], key[order]
-    out = []
-    for found, vertices in tried:
-        own = vertices.place[:, MET] @ WEIGHTS
-        first, last = (np.searchsorted(key, own + gap) for gap in (-SAME_VERTEX, SAME_VERTEX))
-        new = np.ones(len(own), bool)
-        for lane in np.flatnonzero(last > first).tolist():
-            there = place[known[first[lane] : last[lane]]]
-            new[lane] = np.linalg.norm(there - vertices.place[lane], axis=1).min() > SAME_VERTEX
-        kept = found.copy()
-        kept[found] = new
-        out.append((found, vertices) if new.all() else (kept, vertices.take(np.flatnonzero(new))))
-    return out
+    known, place = np.flatnonzero(used), fabric.vertices.place
+    key = place[known[:, None], MET] @ WEIGHTS
+    own = np.concatenate([part.place[:, MET] @ WEIGHTS for part in parts])
+    order = np.argsort(own)
+    first, last = (np.searchsorted(own[order], key + gap) for gap in (-SAME_VERTEX, SAME_VERTEX))
+    for at in np.flatnonzero(last > first).tolist():
+        for number in order[first[at] : last[at]].tolist():
+            part = int(np.searchsorted(cuts, number, "right"))
+            there = parts[part].place[number - cuts[part]]  # counted from the end of the part
+            out[number] |= np.linalg.norm(there - place[known[at]]) <= SAME_VERTEX
+    return np.split(out, cuts[:-1])
 
 
 def on_edges(fabric: Fabric, target: Places, *, refining: bool = False) -> Tried:

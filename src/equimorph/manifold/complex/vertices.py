@@ -18,7 +18,7 @@ from equimorph.manifold.geometry.tangents import (
     tangent_frames,
 )
 
-ROOM = 2
+ROOM = 4
 """Vertices that there is room for when they are copied, relative to those that there are."""
 ON_BOUND = 1e-7
 """Absolute excess over a constraint below which a vertex lies on its bound."""

@@ -126,12 +126,13 @@ class Points:
         p: Float[np.ndarray, "some parameters"],
         index: Some,
         kinds: Some,
+        edges: Some | int = -1,
     ) -> Some:
-        """Add extra points inside cells; return their numbers."""
+        """Add extra points inside cells, or on grid edges; return their numbers."""
         self._reserve(len(z))
         at = np.arange(self.count, self.count + len(z))
         self.z[at], self.p[at], self.index[at], self.kind[at] = z, p, index, kinds
-        self.vertex[at] = self.edge[at] = self.following[at] = -1
+        self.vertex[at], self.edge[at], self.following[at] = -1, edges, -1
         self.count += len(z)
         return at
 

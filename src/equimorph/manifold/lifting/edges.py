@@ -4,11 +4,11 @@ A fold on a traced edge becomes a vertex of the set, exactly as the trace locate
 """
 
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
 
-from equimorph.arrays import Bool, Flags, Float, Int, ItemFlags, Items, Lanes, Numbers, Values
+from equimorph.arrays import Bool, Flags, Float, Int, ItemFlags, Items, Lanes, Numbers, Some, Values
+from equimorph.columns import Columns
 from equimorph.equilibria import Guards, ParameterLine, TraceOptions, settle
 from equimorph.equilibria.curves import squared_length
 from equimorph.equilibria.settle import Held, lower_index
@@ -122,13 +122,14 @@ NOISE = 1e-6
 
 
 @dataclass(frozen=True)
-class Inner:
-    """A point inside an edge."""
+class Inside(Columns):
+    """Points inside the edges of lanes, in order along each lane."""
 
-    z: Float[np.ndarray, " size"]
-    p: Float[np.ndarray, " P"]
-    index: int
-    kind: VertexKind
+    lanes: Items
+    z: Float[np.ndarray, "n size"]
+    p: Float[np.ndarray, "n P"]
+    index: Items
+    kinds: Items
 
 
 @dataclass(frozen=True)
@@ -136,29 +137,14 @@ class Traced:
     """What became of rays that were followed.
 
     good: whether their curves are known; vertices: over which they end, −1 if they left through a
-    constraint; z, index: there, of those good ones that end over vertices; lanes, inner_z, ...: the
-    points inside their edges, in order along each lane.
+    constraint; z, index: there, of those good ones that end over vertices.
     """
 
     good: Bool[np.ndarray, " rays"]
     vertices: Int[np.ndarray, " rays"]
     z: Float[np.ndarray, "n size"]
     index: Items
-    lanes: Int[np.ndarray, " m"]
-    inner_z: Float[np.ndarray, "m size"]
-    inner_p: Float[np.ndarray, "m P"]
-    inner_index: Int[np.ndarray, " m"]
-    kinds: Int[np.ndarray, " m"]
-
-    @property
-    def inner(self) -> dict[int, list[Inner]]:
-        """Points inside the edge of each lane that has such."""
-        out: dict[int, list[Inner]] = {}
-        lanes, index, kinds = (each.tolist() for each in (self.lanes, self.inner_index, self.kinds))
-        for k, lane in enumerate(lanes):
-            point = Inner(self.inner_z[k], self.inner_p[k], index[k], VertexKind(kinds[k]))
-            out.setdefault(lane, []).append(point)
-        return out
+    inside: Inside
 
 
 def trace_rays(pairing: Pairing, rays: Rays) -> None:
@@ -187,23 +173,44 @@ def _trace(pairing: Pairing, rays: Rays, line: ParameterLine, effort: int) -> No
     traced = _follow(pairing, rays, line, options)
     np.add.at(pairing.effort, rays.edges[~traced.good], 1)
     ends = _ends(pairing, traced)
-    inner = traced.inner
-    points, edges = rays.points.tolist(), rays.edges.tolist()
-    for lane in np.flatnonzero(traced.good).tolist():
-        point, edge, end = points[lane], edges[lane], int(ends[lane])
-        known = pairing.ray(point, edge)
-        if known >= 0 and (end < 0 or pairing.other_end(known, point) == end):
-            continue  # the same curve, traced from its other end in the same batch
-        numbers = [_number(pairing, each, edge) for each in inner.get(lane, [])]
-        pairing.enter(point, edge, end, numbers)
+    curves = _enter(pairing, rays, np.flatnonzero(traced.good), ends)
+    inside = traced.inside.take(curves[traced.inside.lanes] >= 0)
+    numbers = _number(pairing, inside, rays.edges[inside.lanes]).tolist()
+    lanes, starts = np.unique(inside.lanes, return_index=True)
+    stops = np.append(starts, len(numbers))[1:]
+    for curve, start, stop in zip(
+        *(a.tolist() for a in (curves[lanes], starts, stops)), strict=True
+    ):
+        pairing.curves.put_inside(curve, numbers[start:stop])
     pairing.fit()
 
 
-def _number(pairing: Pairing, point: Inner, edge: int) -> int:
-    """Number of a point inside an edge; one where curves cross belongs to both."""
-    if point.kind == VertexKind.CROSSING:
-        return pairing.crossing(point.z, point.p, point.index, edge)
-    return pairing.points.add(point.z, point.p, point.index, point.kind, edge)
+def _enter(pairing: Pairing, rays: Rays, good: Items, ends: Numbers) -> Numbers:
+    """Enter the curves of good rays; return the number of that of each ray, −1 if there is none."""
+    curves = np.full(len(ends), -1)
+    curves[good] = pairing.enter_at_once(rays.take(good), ends[good])
+    for lane in good[curves[good] < 0].tolist():
+        point, edge, end = int(rays.points[lane]), int(rays.edges[lane]), int(ends[lane])
+        known = pairing.ray(point, edge)
+        if known >= 0 and (end < 0 or pairing.other_end(known, point) == end):
+            continue  # the same curve, traced from its other end in the same batch
+        curves[lane] = pairing.enter(point, edge, end)
+    return curves
+
+
+def _number(pairing: Pairing, inside: Inside, edges: Items) -> Items:
+    """Numbers of points inside edges; those where curves cross belong to both."""
+    crossing = inside.kinds == VertexKind.CROSSING
+    if not crossing.any():
+        return pairing.points.add_many(inside.z, inside.p, inside.index, inside.kinds, edges)
+    numbers = np.empty(len(edges), int)
+    for k, edge in enumerate(edges.tolist()):
+        place, index = (inside.z[k], inside.p[k]), int(inside.index[k])
+        if crossing[k]:
+            numbers[k] = pairing.crossing(*place, index, edge)
+        else:
+            numbers[k] = pairing.points.add(*place, index, int(inside.kinds[k]), edge)
+    return numbers
 
 
 def _follow(pairing: Pairing, rays: Rays, line: ParameterLine, options: TraceOptions) -> Traced:
@@ -211,20 +218,12 @@ def _follow(pairing: Pairing, rays: Rays, line: ParameterLine, options: TraceOpt
     mesh, setting = pairing.mesh, pairing.setting
     outcome = trace(line, pairing.points.z[rays.points], setting.constraints, options)
     good = np.isin(outcome.code, (EventCode.ARRIVED, EventCode.RETURNED, EventCode.CONSTRAINT))
-    inner = _inner(pairing, rays, outcome, line, good)
-    for lane, cap in _caps(pairing, outcome, line, good).items():
-        inner.setdefault(lane, []).append(cap)
+    inside = _inner(pairing, rays, outcome, line, good)
     side = np.where(outcome.code == EventCode.RETURNED, rays.sides, 1 - rays.sides)
     vertices = mesh.edges[rays.edges, side]
     vertices[outcome.code == EventCode.CONSTRAINT] = -1
     there = np.flatnonzero(good & (vertices >= 0))
-    rows = [(lane, *vars(each).values()) for lane, own in inner.items() for each in own]
-    lanes, z, p, index, kind = zip(*rows, strict=True) if rows else 5 * ((),)
-    return Traced(
-        good, vertices, outcome.z[there], outcome.index[there], np.array(lanes, int),
-        np.array(z).reshape(-1, setting.structure.size), np.array(p).reshape(-1, len(setting.base)),
-        np.array(index, int), np.array(kind, int),
-    )  # fmt: skip
+    return Traced(good, vertices, outcome.z[there], outcome.index[there], inside)
 
 
 def _ends(pairing: Pairing, traced: Traced) -> Numbers:
@@ -238,25 +237,26 @@ def _ends(pairing: Pairing, traced: Traced) -> Numbers:
     return ends
 
 
-def _caps(pairing: Pairing, outcome: Traces, line: ParameterLine, good: Flags) -> dict[int, Inner]:
+def _caps(pairing: Pairing, outcome: Traces, line: ParameterLine, good: Flags) -> Inside:
     """Points at which lanes left through a constraint."""
     lanes = np.flatnonzero(good & (outcome.code == EventCode.CONSTRAINT))
     z, p = outcome.z[lanes], line.take(lanes).parameters(outcome.t[lanes])
     # counted anew: a fold may lie between the last step and the constraint
-    index = pairing.setting.structure.index(z, p).tolist()
-    return {int(lane): Inner(z[k], p[k], index[k], VertexKind.CAP) for k, lane in enumerate(lanes)}
+    index = pairing.setting.structure.index(z, p)
+    return Inside(lanes, z, p, index, np.full(len(lanes), VertexKind.CAP))
 
 
 def _inner(
     pairing: Pairing, rays: Rays, outcome: Traces, line: ParameterLine, good: Flags
-) -> dict[int, list[Inner]]:
-    """Folds and crossings of each lane in order, with one regular point between neighbours.
+) -> Inside:
+    """Folds and crossings of each lane, one regular point between neighbours, and where it left.
 
     Folds stay where the trace located them (`equilibria.locate`); crossings are corrected again.
     Lanes on which a crossing cannot be polished are not `good` any more.
     """
     passed = outcome.passed
     at = np.flatnonzero(np.isin(passed.code, (EventCode.FOLD, EventCode.BRANCH_POINT)))
+    at = at[np.argsort(passed.lanes[at], kind="stable")]
     z, index = passed.z[at].copy(), passed.index[at].min(axis=1)
     p = line.start[passed.lanes[at]] + passed.t[at][:, None] * line.velocity[passed.lanes[at]]
     kind = np.where(passed.code[at] == EventCode.FOLD, VertexKind.FOLD, VertexKind.CROSSING)
@@ -274,46 +274,40 @@ def _inner(
         those = rays.take(passed.lanes[at[doubtful]])
         again = _pin(pairing, those, z[doubtful], p[doubtful], VertexKind.FOLD)
         keep[doubtful] = again.found
-    places: dict[int, list[int]] = {}
-    for k in np.flatnonzero(keep).tolist():
-        places.setdefault(int(passed.lanes[at[k]]), []).append(k)
-    pairs = [pair for own in places.values() for pair in pairwise(own)]
-    between = iter(_between(outcome, line, at, z, pairs))
-    rows: dict[int, list[Inner]] = {}
-    for lane, events in places.items():
-        rows[lane] = []
-        for k in events:
-            if rows[lane]:
-                rows[lane].append(next(between))
-            rows[lane].append(Inner(z[k], p[k], int(index[k]), VertexKind(kind[k])))
-    return rows
+    events = Inside(passed.lanes[at], z, p, index, kind).take(keep)
+    at = at[keep]
+    first = np.flatnonzero(events.lanes[1:] == events.lanes[:-1])
+    between = _between(outcome, line, at, events, first)
+    caps = _caps(pairing, outcome, line, good)
+    place = np.concatenate(
+        [2 * np.arange(len(at)), 2 * first + 1, np.full(len(caps.lanes), 2 * len(at))]
+    )
+    inside = Inside.concatenate([events, between, caps])
+    return inside.take(np.lexsort((place, inside.lanes)))
 
 
 def _between(
-    outcome: Traces,
-    line: ParameterLine,
-    at: Items,
-    z: Float[np.ndarray, "n size"],
-    pairs: list[tuple[int, int]],
-) -> list[Inner]:
-    """A regular point between each of some pairs of events that follow each other on a lane.
+    outcome: Traces, line: ParameterLine, at: Items, events: Inside, first: Some
+) -> Inside:
+    """A regular point between each of some events and the next one, on the same lane.
 
     Recorded ones are near it if there are any; the index is its own: near crossings the tracer met
     round-off.
     """
-    if not pairs:
-        return []
-    passed, near, t = outcome.passed, [], []
-    for pair in pairs:
-        both = at[list(pair)]
-        row = _recorded(outcome, int(passed.lanes[both[0]]), passed.travelled[both])
-        near.append(z[list(pair)].mean(axis=0) if row is None else outcome.points.z[row])
-        t.append(passed.t[both].mean() if row is None else outcome.points.t[row])
-    lines = line.take(passed.lanes[at[[first for first, _ in pairs]]])
-    p = lines.parameters(np.array(t))
-    found = settle(line.structure, np.array(near), p, lines.velocity[:, None], (), SAFE, Held()).z
-    index = line.structure.index(found, p).tolist()
-    return [Inner(found[k], p[k], index[k], VertexKind.BETWEEN) for k in range(len(pairs))]
+    if len(first) == 0:
+        return events.take(first)
+    passed, lanes = outcome.passed, events.lanes[first]
+    near = 0.5 * (events.z[first] + events.z[first + 1])
+    t = 0.5 * (passed.t[at[first]] + passed.t[at[first + 1]])
+    for k, lane in enumerate(lanes.tolist()):
+        row = _recorded(outcome, lane, passed.travelled[at[first[k] : first[k] + 2]])
+        if row is not None:
+            near[k], t[k] = outcome.points.z[row], outcome.points.t[row]
+    lines = line.take(lanes)
+    p = lines.parameters(t)
+    found = settle(line.structure, near, p, lines.velocity[:, None], (), SAFE, Held()).z
+    index = line.structure.index(found, p)
+    return Inside(lanes, found, p, index, np.full(len(lanes), VertexKind.BETWEEN))
 
 
 def _first_ones(pairing: Pairing, lanes: Items, pinned: Pinned) -> ItemFlags:

@@ -85,11 +85,11 @@ def flood(pairing: Pairing, progress: Progress) -> None:
     """
     while not pairing.is_full:
         flood_directly(pairing, progress)
-        take_back_hiding(pairing)
         long = pairing.rays_with(RayMark.LONG)
         if len(long.points):
             _lift_long(pairing, long)
             continue
+        take_back_hiding(pairing)
         hard = _one_of_each_pair(pairing, pairing.rays_with(RayMark.HARD))
         if len(hard.points) == 0:
             return

@@ -4,6 +4,7 @@ Tangents of the set at its points over grid vertices tell where rays end: see do
 "Every point is corrected once, and rays are matched by tangents".
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum
 
@@ -121,13 +122,19 @@ class Curves:
 
     def add(self, edge: int, start: int, end: int, inner: list[int]) -> int:
         """Add a curve; return its number."""
-        number = int(self.extend(*np.array([[edge], [start], [end]]))[0])
+        self._make_room(self.count + 1)
+        number, self.count = self.count, self.count + 1
+        self._columns[:, number] = edge, start, end, 0
         self.put_inside(number, inner)
         return number
 
     def extend(self, edges: Items, starts: Items, ends: Items) -> Items:
         """Add curves without inner points; return their numbers."""
-        return self._append(np.stack([edges, starts, ends, np.zeros_like(edges)]))
+        known, self.count = self.count, self.count + len(edges)
+        self._make_room(self.count)
+        for own, column in zip(self._columns, (edges, starts, ends, 0), strict=True):
+            own[known : self.count] = column
+        return np.arange(known, self.count)
 
     def put_inside(self, curve: int, inner: list[int]) -> None:
         """Enter the inner points of a curve, if it has any."""
@@ -135,15 +142,11 @@ class Curves:
             self.inner[curve] = inner
             self._columns[3, curve] = len(inner)
 
-    def _append(self, columns: Int[np.ndarray, "4 n"]) -> Items:
-        numbers = self.count + np.arange(columns.shape[1])
-        self.count += len(numbers)
-        if self.count > self._columns.shape[1]:
-            grown = np.empty((4, max(2 * self._columns.shape[1], self.count, 64)), int)
+    def _make_room(self, count: int) -> None:
+        if count > self._columns.shape[1]:
+            grown = np.empty((4, max(2 * self._columns.shape[1], count, 64)), int)
             grown[:, : self._columns.shape[1]] = self._columns
             self._columns = grown
-        self._columns[:, numbers] = columns
-        return numbers
 
 
 @dataclass(frozen=True)
@@ -240,11 +243,14 @@ class Pairing:
         from_first[edges[sides == 0]] = True
         return Rays(points, edges, sides).take((sides == 0) | ~from_first[edges])
 
-    def enter(self, point: int, edge: int, end: int, inner: list[int]) -> None:
-        """Register a curve; contradictions take back what they contradict and raise the effort."""
+    def enter(self, point: int, edge: int, end: int, inner: Sequence[int] = ()) -> int:
+        """Register a curve; return its number, −1 if it is known or contradicts another one.
+
+        Contradictions take back what they contradict and raise the effort.
+        """
         known = self.ray(point, edge)
         if known >= 0 and self.other_end(known, point) == end:
-            return
+            return -1
         taken = end >= 0 and self.ray(end, edge) >= 0
         if known >= 0 or taken or end == point:
             self.conflicts += 1
@@ -252,29 +258,46 @@ class Pairing:
             for curve in {known, self.ray(end, edge) if end >= 0 else -1}:
                 if curve >= 0:
                     self.forget(curve)
-            return
-        curve = self.curves.add(edge, point, end, inner)
+            return -1
+        curve = self.curves.add(edge, point, end, list(inner))
         self.set_ray(point, edge, curve)
         if end >= 0:
             self.set_ray(end, edge, curve)
+        return curve
+
+    def enter_at_once(self, rays: Rays, ends: Items) -> Items:
+        """Register curves where nothing is known; return their numbers, −1 for those left over.
+
+        Left over are those that start or end with rays that have curves, or that others start or
+        end with, too. Curves that leave through a constraint have −1 as their ends.
+        """
+        width, table = self.rays.shape[1], self.rays.ravel()
+        near = rays.points * width + self.slots[rays.edges, rays.sides]
+        arrived = ends >= 0
+        there, edges = ends[arrived], rays.edges[arrived]
+        sides = (self.mesh.edges[edges, 1] == self.points.vertex[there]).astype(int)
+        far = there * width + self.slots[edges, sides]
+        keys = np.concatenate([near, far])
+        number, met = np.arange(len(keys)), np.empty(len(table), int)
+        met[keys] = number
+        met[keys[met[keys] != number]] = -1  # those that were overwritten
+        free = (met[keys] == number) & (table[keys] < 0)
+        new = free[: len(near)]
+        new[arrived] &= free[len(near) :]
+        numbers = np.full(len(ends), -1)
+        numbers[new] = own = self.curves.extend(rays.edges[new], rays.points[new], ends[new])
+        table[near[new]] = own
+        table[far[new[arrived]]] = numbers[new & arrived]
+        return numbers
 
     def enter_many(self, rays: Rays, ends: Items) -> None:
-        """Register curves that cross their edges: at once where nothing is known, else singly."""
-        near, far = (self.slots[rays.edges, side] for side in (rays.sides, 1 - rays.sides))
-        _, first, shared = np.unique(
-            ends * self.rays.shape[1] + far, return_index=True, return_counts=True
-        )
-        new = np.zeros(len(ends), bool)
-        new[first] = shared == 1
-        new &= (self.rays[rays.points, near] < 0) & (self.rays[ends, far] < 0)
-        numbers = self.curves.extend(rays.edges[new], rays.points[new], ends[new])
-        self.rays[rays.points[new], near[new]] = numbers
-        self.rays[ends[new], far[new]] = numbers
-        rest = rays.take(~new)
+        """Register curves without inner points: at once where nothing is known, else singly."""
+        left = np.flatnonzero(self.enter_at_once(rays, ends) < 0)
+        rest = rays.take(left)
         for point, edge, end in zip(
-            rest.points.tolist(), rest.edges.tolist(), ends[~new].tolist(), strict=True
+            rest.points.tolist(), rest.edges.tolist(), ends[left].tolist(), strict=True
         ):
-            self.enter(point, edge, end, [])
+            self.enter(point, edge, end)
 
     def other_end(self, curve: int, point: int) -> int:
         """Point at the other end of a curve."""

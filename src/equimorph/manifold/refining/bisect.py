@@ -2,16 +2,11 @@
 
 Bisection predicts a vertex from both ends of an edge. Where a fold or a constraint forms a narrow
 tongue between them, the prediction fails: then the curve is followed from one end to the other.
-
-Vertices keep their numbers, and new ones are appended, so that a part goes back as it is.
 """
-
-from dataclasses import dataclass, replace
-from itertools import combinations
 
 import numpy as np
 
-from equimorph.arrays import EdgeFlags, Flags, Int, ItemFlags, Items, Pairs, Values, VertexFlags
+from equimorph.arrays import Flags, Int, ItemFlags, Items, Pairs, Values
 from equimorph.equilibria.critical import Critical, Test
 from equimorph.equilibria.critical_tests import gap
 from equimorph.equilibria.locus import Locus, Spots, nearest
@@ -23,88 +18,12 @@ from equimorph.manifold.complex.edge_points import Places, chunks, on_all_edges,
 from equimorph.manifold.complex.marked_complex import CURVES, Fabric, FacetMark
 from equimorph.manifold.complex.vertices import Vertices, gather, vertices_of
 from equimorph.manifold.geometry.points import CAP, CROSSING, FOLD
-from equimorph.manifold.geometry.topology import count_corners, keys_of
+from equimorph.manifold.geometry.topology import keys_of
 from equimorph.manifold.refining.deviation import Edges, Memory, choose_edges, update_edges
+from equimorph.manifold.refining.patches import Patch, small_patch
 from equimorph.manifold.refining.refill import flip, refill
 from equimorph.model import Progress, Silent, worst_excess
 from equimorph.tolerances import IN_BOX
-
-
-@dataclass(frozen=True)
-class Patch:
-    """Some cells of a fabric with all facets between their vertices, and the rest of it.
-
-    inside: vertices of the patch. Edges of the rest between them are marked `FacetMark.RIM`: they
-    are not bisected, keep their vertices, and flips do not make them a second time.
-    """
-
-    fabric: Fabric
-    rest: Fabric
-    inside: VertexFlags
-
-    def replace_by(self, by: Fabric) -> Fabric:
-        """Return the whole fabric, with another one in place of the patch."""
-        kept, rest = (by.marks & FacetMark.RIM) == 0, self.rest
-        return replace(
-            by,
-            cells=np.concatenate([rest.cells, by.cells]),
-            cell_index=np.concatenate([rest.cell_index, by.cell_index]),
-            squared=np.concatenate([rest.squared, by.squared]),
-            facets=np.concatenate([rest.facets, by.facets[kept]]),
-            marks=np.concatenate([rest.marks, by.marks[kept]]),
-        )
-
-
-def patch_around(fabric: Fabric, near: VertexFlags, rings: int) -> Patch:
-    """Triangles around flagged vertices, and `rings` further rings, of all sheets that cross.
-
-    Edges on crossings that other sheets hold beyond the patch belong to its rim.
-    """
-    for _ in range(rings + 1):
-        near = _in_all_sheets(fabric, near)
-        own = count_corners(near, fabric.cells) > 0
-        near = np.zeros_like(near)
-        near[fabric.cells[own]] = True
-    rest = fabric.only(~own)
-    beyond = np.zeros_like(near)
-    beyond[rest.cells] = True
-    within = near[fabric.facets].all(axis=1)
-    # the rim of a patch that this one is a part of stays that of the larger one, too
-    outer = (fabric.marks & FacetMark.RIM) > 0
-    rims = [_pairs_between(rest.cells, near & beyond), fabric.facets[within & outer]]
-    rim = np.unique(np.sort(np.concatenate(rims), axis=1), axis=0)
-    shared = within & ~outer
-    facets, marks = fabric.facets[shared], fabric.marks[shared]
-    outside = _in_all_sheets(fabric, beyond & (near | (fabric.vertices.shared >= 0)))
-    held = ((marks & FacetMark.CROSSING) > 0) & outside[facets].any(axis=1)
-    rim = np.concatenate([rim, facets[held]])
-    patch = replace(
-        fabric.only(own),
-        facets=np.concatenate([facets, rim]),
-        marks=np.concatenate([marks, np.full(len(rim), FacetMark.RIM)]),
-    )
-    rest = replace(rest, facets=fabric.facets[~shared], marks=fabric.marks[~shared])
-    return Patch(patch, rest, near)
-
-
-def _in_all_sheets(fabric: Fabric, near: VertexFlags) -> VertexFlags:
-    """Some vertices, and those that are the same points of other sheets."""
-    shared = fabric.vertices.shared
-    met = np.zeros(int(shared.max(initial=-1)) + 2, bool)
-    met[shared[near]] = True
-    met[-1] = False
-    return np.asarray(near | met[shared])
-
-
-def _pairs_between(
-    cells: Int[np.ndarray, "n corners"], chosen: VertexFlags
-) -> Int[np.ndarray, "m 2"]:
-    """Edges of cells, sorted, both of whose ends are chosen."""
-    cells = cells[count_corners(chosen, cells) > 1]
-    pairs = [cells[:, list(pair)] for pair in combinations(range(cells.shape[1]), 2)]
-    edges = np.concatenate(pairs)
-    return np.unique(np.sort(edges[chosen[edges].all(axis=1)], axis=1), axis=0)
-
 
 ROUNDS = 200
 """Largest number of rounds of bisections."""
@@ -116,10 +35,6 @@ HOPELESS = 60
 """Failed bisections, and a fiftieth of all edges, beyond which refinement ends."""
 MOST = 4_000_000
 """Cells beyond which refinement ends."""
-LOCAL = 40
-"""Reciprocal share of deviating edges up to which only their surroundings are refined."""
-RINGS = 4
-"""Rings of cells around edges that deviate, which longer ones to be cut first may lie in."""
 
 
 def settle(
@@ -129,10 +44,7 @@ def settle(
     progress: Progress | None = None,
     most: int = MOST,
 ) -> Fabric:
-    """Bisect and flip until no edge deviates that can be bisected, or there are too many cells.
-
-    Without a sink for progress all at once, even if little is to be done.
-    """
+    """Bisect and flip until no edge deviates that can be bisected, or there are too many cells."""
     cells = len(fabric.cells)
     for _ in range(ROUNDS):
         edges = update_edges(fabric, memory)
@@ -140,8 +52,9 @@ def settle(
         todo = ((edges.error > tolerance) | edges.pressing | edges.uneven) & ~edges.stuck
         if hopeless or len(fabric.cells) > most or not todo.any():
             break
-        if progress is not None and _few(fabric, todo):
-            fabric = _settle_around(fabric, edges.ends[todo], tolerance, memory)
+        patch = small_patch(fabric, edges.ends[todo].ravel())
+        if patch is not None:
+            fabric = _settle_patch(patch, tolerance, memory, most)
             continue
         (progress or Silent()).report(
             "refining", int((edges.error <= tolerance).sum()), len(edges.error)
@@ -156,18 +69,11 @@ def settle(
     return fabric
 
 
-def _few(fabric: Fabric, todo: EdgeFlags) -> bool:
-    """Whether so few edges deviate that it is worth while to work around them alone."""
-    return fabric.dimension == 2 and int(np.count_nonzero(todo)) * LOCAL < len(todo)
-
-
-def _settle_around(fabric: Fabric, ends: Pairs, tolerance: float, memory: Memory) -> Fabric:
-    """Bisect and flip around some edges until none deviates there."""
-    near = np.zeros(len(fabric.vertices), bool)
-    near[ends] = True
-    patch = patch_around(fabric, near, RINGS)
+def _settle_patch(patch: Patch, tolerance: float, memory: Memory, most: int) -> Fabric:
+    """Bisect and flip in a patch until no edge deviates there; return the whole fabric."""
     inner = memory.among(patch.inside)
-    out = patch.replace_by(settle(patch.fabric, tolerance, inner))
+    most -= len(patch.rest.cells)
+    out = patch.replace_by(settle(patch.fabric, tolerance, inner, most=most))
     memory.learn(inner, patch.inside)
     return out
 
@@ -226,6 +132,8 @@ def _vertices_on(
     parts: list[Vertices] = []
     left = wanted
     for t in PLACES:
+        if len(left) == 0:
+            break
         own = chunks(left, edges.marks)
         places = [
             Places(edges.ends[some], int(edges.marks[some[0]]), lowest[some], np.full(len(some), t))

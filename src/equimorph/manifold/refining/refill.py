@@ -20,6 +20,7 @@ from equimorph.manifold.geometry.topology import among, keys_of, rows_of
 from equimorph.manifold.refining.deviation import Memory, deviations
 from equimorph.manifold.refining.edge_stars import reconnections
 from equimorph.manifold.refining.kernels import flip_edges
+from equimorph.manifold.refining.patches import small_patch
 from equimorph.manifold.refining.quality import qualities, qualities_near
 from equimorph.manifold.refining.stars import GAIN, Quality, Refills, gains, hopeful, with_exact
 from equimorph.manifold.refining.vertex_stars import collapses, moves
@@ -61,17 +62,31 @@ def refill(
     near = np.ones(len(fabric.vertices), bool)
     touched = ~near
     for _ in range(ROUNDS[fabric.dimension][fine]):
-        fabric, changed = _reconnect(fabric, memory)
-        quality = qualities_near(fabric, near | changed)
-        for candidates, passes in _kinds(fabric, memory, short if fine else 0.0)[: 2 + fine]:
-            found = repeat(candidates, passes, fabric, quality, near, memory, limit)
-            fabric, quality, own = found
-            near, changed = _extend(near, fabric), _extend(changed, fabric) | own
-        near, touched = changed, _extend(touched, fabric) | changed
+        patch = small_patch(fabric, np.flatnonzero(near))
+        part = fabric if patch is None else patch.fabric
+        part, near = _refill_once(part, memory, limit, near, short if fine else None)
+        fabric = part if patch is None else patch.replace_by(part)
+        touched = _extend(touched, fabric) | near
         if not near.any():
             break
     memory.forget(touched)
     return fabric
+
+
+def _refill_once(
+    fabric: Fabric, memory: Memory, limit: float, near: Near, short: float | None
+) -> tuple[Fabric, NewNear]:
+    """Try all candidates around some vertices, one kind after the other; and what changed.
+
+    `short` is None where cells are not fine.
+    """
+    fabric, changed = _reconnect(fabric, memory)
+    quality = qualities_near(fabric, near | changed)
+    for candidates, passes in _kinds(fabric, memory, short):
+        found = repeat(candidates, passes, fabric, quality, near, memory, limit)
+        fabric, quality, own = found
+        near, changed = _extend(near, fabric), _extend(changed, fabric) | own
+    return fabric, changed
 
 
 def _reconnect(fabric: Fabric, memory: Memory) -> tuple[Fabric, Near]:
@@ -84,14 +99,14 @@ def _reconnect(fabric: Fabric, memory: Memory) -> tuple[Fabric, Near]:
     return fabric, changed
 
 
-def _kinds(fabric: Fabric, memory: Memory, short: float) -> list[tuple[Candidates, int]]:
+def _kinds(fabric: Fabric, memory: Memory, short: float | None) -> list[tuple[Candidates, int]]:
     """Functions that return candidates, and how often each is called in a round."""
     but, _ = memory.past_edges(fabric)
     rings = partial(reconnections, but=but)
     return [
-        (rings, RECONNECTIONS if fabric.dimension == TETRAHEDRA else 0),
-        (partial(collapses, short=short), COLLAPSES),
-        (moves, MOVES),
+        *([(rings, RECONNECTIONS)] if fabric.dimension == TETRAHEDRA else []),
+        (partial(collapses, short=short or 0.0), COLLAPSES),
+        *([(moves, MOVES)] if short is not None else []),
     ]
 
 

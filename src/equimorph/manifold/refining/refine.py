@@ -23,8 +23,9 @@ from equimorph.manifold.complex.excerpts import fabric_of
 from equimorph.manifold.complex.kept_sets import question_of_refinement, recall_set
 from equimorph.manifold.complex.marked_complex import CURVES, Fabric, FacetMark
 from equimorph.manifold.queries.cusps import with_cusps_beside
-from equimorph.manifold.refining.bisect import Patch, bisect, part_sheets, patch_around, settle
+from equimorph.manifold.refining.bisect import bisect, part_sheets, settle
 from equimorph.manifold.refining.deviation import Edges, Memory, near_lost, update_edges
+from equimorph.manifold.refining.patches import Patch, patch_around
 from equimorph.manifold.refining.quality import (
     SHARP,
     confined_angles,
