@@ -123,6 +123,38 @@ def test_chains_use_every_edge_once():
     assert sorted(used.tolist()) == pairs.tolist()
 
 
+def _one_by_one(pairs):
+    """The lines of `chains`, in the same order, edge by edge."""
+    around = {}
+    for number, pair in enumerate(pairs.tolist()):
+        for end in pair:
+            around.setdefault(end, []).append(number)
+    used, lines = set(), []
+    forks = [v for v, edges in around.items() if len(edges) != 2]
+    for start, closed in [*((v, False) for v in forks), *((v, True) for v in around)]:
+        for edge in around[start]:
+            if edge in used or (closed and around[start][0] in used):
+                continue
+            line, onward = [start], [edge]
+            while onward:
+                used.add(onward[0])
+                line.append(int(pairs[onward[0]].sum()) - line[-1])
+                here = around[line[-1]]
+                onward = [e for e in here if e not in used] if len(here) == 2 else []
+            lines.append(line)
+    return lines
+
+
+@pytest.mark.parametrize("edges", [1, 12, 40, 200])
+def test_chains_are_those_that_are_walked_one_by_one(edges):
+    generator = np.random.default_rng(edges)
+    pairs = np.unique(np.sort(generator.integers(0, 2 * edges, (edges, 2)), axis=1), axis=0)
+    pairs = generator.permutation(pairs[pairs[:, 0] != pairs[:, 1]])
+    ring = np.stack([np.arange(5), np.roll(np.arange(5), 1)], axis=1) + 2 * edges
+    for some in (pairs, np.concatenate([pairs, ring])):
+        assert [line.tolist() for line in chains(some)] == _one_by_one(some)
+
+
 def test_chains_of_nothing_are_none():
     assert chains(np.zeros((0, 2), int)) == []
 

@@ -207,6 +207,39 @@ def look_back(place, rows, cells, out):
 
 
 @njit(nogil=True)
+def walk_chains(ends, first, around, order):
+    """Polylines along edges, split where other than two meet; closed ones repeat the start.
+
+    ends (E, 2): vertices of the edges; the edges around vertex v are those from ``first[v]`` to
+    ``first[v + 1]`` of `around`; order: of the vertices from which lines start. Returns the
+    vertices of all lines, one line after the other, and where they start.
+    """
+    used = np.zeros(ends.shape[0], np.bool_)
+    points, starts = np.empty(2 * ends.shape[0], np.int64), np.empty(ends.shape[0], np.int64)
+    count, stop = 0, 0
+    for closed in range(2):
+        for start in order:
+            if closed == 0 and first[start + 1] - first[start] == 2:
+                continue
+            for side in range(first[start], first[start + 1]):
+                edge, at = around[side], start
+                if used[edge] or (closed == 1 and used[around[first[start]]]):
+                    continue
+                starts[count], points[stop] = stop, start
+                count, stop = count + 1, stop + 1
+                while edge >= 0:
+                    used[edge] = True
+                    at = ends[edge, 1] if ends[edge, 0] == at else ends[edge, 0]
+                    points[stop], stop, edge = at, stop + 1, -1
+                    if first[at + 1] - first[at] == 2:
+                        for onward in around[first[at] : first[at + 1]]:
+                            if not used[onward]:
+                                edge = onward
+                                break
+    return points[:stop], starts[:count]
+
+
+@njit(nogil=True)
 def cut_rows(rows, edges, base):
     """Cut rows of vertices below `base` at vertices base + e on edges e, the first ones first.
 

@@ -21,7 +21,7 @@ from equimorph.arrays import (
     VertexNumbers,
 )
 from equimorph.linalg.graphs import components
-from equimorph.manifold.geometry.kernels import orient
+from equimorph.manifold.geometry.kernels import orient, walk_chains
 from equimorph.manifold.geometry.simplices import volumes
 
 PAIR = 2
@@ -199,29 +199,11 @@ def chains(pairs: Pairs) -> list[Int[np.ndarray, "..."]]:
     """Polylines along edges, split where other than two meet; closed ones repeat the start."""
     if len(pairs) == 0:
         return []
-    ends = pairs.tolist()
-    around: dict[int, list[int]] = {}
-    for number, (a, b) in enumerate(ends):
-        around.setdefault(a, []).append(number)
-        around.setdefault(b, []).append(number)
-    used, out = [False] * len(ends), []
-    starts = [v for v, edges in around.items() if len(edges) != 2]
-    for start, alone in [*((v, False) for v in starts), *((v, True) for v in around)]:
-        for number in around[start]:
-            if used[number] or (alone and used[around[start][0]]):
-                continue
-            line, at, edge = [start], start, number
-            while True:
-                used[edge] = True
-                a, b = ends[edge]
-                at = b if at == a else a
-                line.append(at)
-                onward = [e for e in around[at] if not used[e]]
-                if len(around[at]) != 2 or not onward:
-                    break
-                edge = onward[0]
-            out.append(np.array(line))
-    return out
+    vertices, seen, ends = np.unique(pairs, return_index=True, return_inverse=True)
+    order = np.argsort(ends.ravel(), kind="stable") // PAIR
+    first = np.concatenate([[0], np.cumsum(np.bincount(ends.ravel()))])
+    points, starts = walk_chains(ends.reshape(-1, PAIR), first, order, np.argsort(seen))
+    return np.split(vertices[points], starts[1:])
 
 
 def orientation(cells: Cells, whole: Adjacency) -> tuple[CellNumbers, int]:
