@@ -100,6 +100,59 @@ def test_sets_are_singular_on_sides(kind, place):
     assert np.abs(of_place).max(initial=0.0) < 1e-9
 
 
+ENTRIES = {
+    "strip": (lambda a, b: -1.0 * a, 1e-6),
+    "wider strip": (lambda a, b: -1.0 * a, 1e-4),
+    "cap": (lambda a, b: -1.0 * a - b**2, 1e-6),
+    "corner": (lambda a, b: -1.0 * a - (b + 0.83), 1e-4),
+}
+"""Depth of g(a, b) in the box, but for what is added, and how far it then reaches into the box."""
+
+
+def entry_of(place, depth):
+    """The set y² = g(a, b) + depth over 0 ≤ a ≤ 1, −0.83 ≤ b ≤ 1, and g."""
+    outside = ENTRIES[place][0]
+
+    def g(a, b):
+        return outside(a, b) + depth
+
+    with unchecked():
+        structure = Polynomial(lambda x, a, b: integral_of(FORCES["fold"], g, x, a, b), 1, "ab")
+        return equilibrium_set(structure, Box(a=UNIT, b=LONG), intervals=(6, 7)), g
+
+
+@pytest.mark.parametrize("place", ENTRIES)
+def test_sheets_enter_through_a_side_by_less_than_a_cell(place):
+    """Closed form: y² = g where g > 0 in a strip, a cap or a corner of the box, down to 1e-6 deep.
+
+    The states over points of it are there, and none over points beyond.
+    """
+    depth = ENTRIES[place][1]
+    eset, g = entry_of(place, depth)
+    assert eset.audit.clean, eset.audit.faults
+    assert eset.audit.components == 1
+    assert eset.audit.grazing == ()
+    generator = np.random.default_rng(0)
+    a = generator.uniform(0.0, 1.2 * depth, 200)
+    width = {"cap": np.sqrt(depth), "corner": depth}.get(place, 1.0)
+    b = width * generator.uniform(-0.8, 0.8, 200) if place != "corner" else -0.83 + a[::-1]
+    found = np.bincount(eset.over(a=a, b=b).point, minlength=200)
+    np.testing.assert_array_equal(found, np.where(g(a, b) > 0.0, 2, 0))
+
+
+@pytest.mark.parametrize("place", ENTRIES)
+def test_the_audit_names_sheets_that_end_in_sides(place):
+    """y² = g ≤ 0 in the box: no set, but singular states in a = 0; beyond a distance nothing."""
+    touching, _ = entry_of(place, 0.0)
+    away, _ = entry_of(place, -1e-6)
+    assert len(touching.cells) == len(away.cells) == 0
+    assert touching.audit.clean
+    assert any(dict(at)["a"] == 0.0 for at in touching.audit.grazing)
+    assert "sheets end in sides" in dict(touching.audit.rows())
+    assert away.audit.grazing == ()
+    assert "sheets end in sides" not in dict(away.audit.rows())
+
+
 def test_cusps_lie_on_sides():
     """y³ = a y + b: the cusp lies on a side or in a corner, or its axis lies in a side."""
     for sides in ((UNIT, LONG), (UNIT, UNIT), (LONG, UNIT), ((-1.0, 0.0), LONG)):

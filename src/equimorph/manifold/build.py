@@ -325,6 +325,7 @@ class _Lifting:
             stopped=self.pairing.points.count if full else 0,
             cell_size=_named(box, (box.upper - box.lower) / np.array(self.intervals)),
             touching=tuple(_named(box, place) for place in cells.touching),
+            grazing=tuple(_named(box, place) for place in found.grazing),
         )
         return replace(eset, audit=audit)
 

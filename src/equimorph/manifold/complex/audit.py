@@ -43,6 +43,8 @@ class Audit:
     they are followed to where they are nearest, and cells with a neck inside are bisected;
     `touching`, of which there must be none, are the points at which they touch, like the tip of a
     cone, or are nearer than states can be told apart.
+    Sheets that lie beyond the box may end in a side of it, in a fold that lies in the side or
+    touches it: that is no part of the set, and `grazing` has a point of each such side.
 
     Vertices that the discretisation does not resolve (`unresolved`) belong to a set where curves
     lead to them; the searches found `left_out` others, which it lacks, and which must be zero, too:
@@ -94,6 +96,7 @@ class Audit:
     unresolved: int = 0
     left_out: int = 0
     on_lines: int = 0
+    grazing: tuple[tuple[tuple[str, float], ...], ...] = ()
 
     def __repr__(self) -> str:
         """Whether it is clean, else what is not; sizes."""
@@ -190,6 +193,7 @@ class Audit:
             ("lines through all strata", self._lines),
             *([("not resolved", self._unresolved)] if self.unresolved + self.left_out else []),
             *([("sheets touch", self._touching)] if self.touching else []),
+            *([("sheets end in sides", self._grazing)] if self.grazing else []),
             *([("closed pieces, necks", self._unseen)] if self.cell_size else []),
             *(refined if self.accuracy else []),
         ]
@@ -197,8 +201,15 @@ class Audit:
     @property
     def _touching(self) -> str:
         """Where sheets touch: one line."""
-        places = (", ".join(f"{name} = {value:.6g}" for name, value in at) for at in self.touching)
-        return f"in one point (cone point) at {'; '.join(places)}"
+        return f"in one point (cone point) at {_at(self.touching)}"
+
+    @property
+    def _grazing(self) -> str:
+        """In which sides sheets end that are no part of the set: one line."""
+        return (
+            f"which lie beyond the box, in folds as at {_at(self.grazing)}: singular states over "
+            "the sides alone, which the set leaves out"
+        )
 
     @property
     def _unresolved(self) -> str:
@@ -234,6 +245,11 @@ class Audit:
             f"{ends or 'no unstable stratum'}; no stable sheet is missing unless every sheet of "
             "index one beside it is missing as well"
         )
+
+
+def _at(places: tuple[tuple[tuple[str, float], ...], ...]) -> str:
+    """Points by the names of their parameters."""
+    return "; ".join(", ".join(f"{name} = {value:.6g}" for name, value in at) for at in places)
 
 
 def _percent(share: float) -> str:

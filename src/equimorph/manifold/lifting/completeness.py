@@ -5,11 +5,11 @@ What is missing becomes equilibria over the vertices of the grid.
 See docs/decisions.md, "Random checks are also the last seeds".
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from equimorph.arrays import Float, Int, Lanes
+from equimorph.arrays import Float, Int, Lanes, Places
 from equimorph.equilibria import search_points
 from equimorph.equilibria.random_search import Ground, Pools
 from equimorph.equilibria.settle import Guards, free_directions, settle
@@ -22,6 +22,7 @@ from equimorph.manifold.lifting.grid import bisect, split_at
 from equimorph.manifold.lifting.hidden_islands import hidden_islands
 from equimorph.manifold.lifting.pairing import Pairing
 from equimorph.manifold.lifting.seeds import Seeds, polish
+from equimorph.manifold.lifting.states_in_sides import are_grazing, states_in_sides
 from equimorph.manifold.lookup.exact_states import exact_states, lift_to
 from equimorph.model import Progress, are_feasible, position
 from equimorph.structures import States, join_states
@@ -42,7 +43,8 @@ class Check:
 
     descents: how many descents from unstable strata ended how; what they landed on is among those
     that were found. on_lines: states that lines through the strata met. left_out: states that the
-    set lacks, and the discretisation does not resolve.
+    set lacks, and the discretisation does not resolve. grazing: points of sides in which sheets
+    end that lie beyond the box.
     """
 
     found: int
@@ -50,6 +52,7 @@ class Check:
     descents: tuple[tuple[str, int], ...] = ()
     on_lines: int = 0
     left_out: int = 0
+    grazing: Places = field(default_factory=lambda: np.zeros((0, 0)))
 
 
 def check(
@@ -88,6 +91,7 @@ def _missing(eset: EquilibriumSet, places: list[dict[str, float]], seed: int) ->
     )
     scattered = _scattered(eset, SCATTERED, np.random.default_rng(seed))
     resolved = scattered.resolved
+    in_sides, grazing = _in_sides(eset, np.random.default_rng(seed))
     led, pools = descents_of_set(eset), _on_lines(eset, np.random.default_rng(seed))
     begun = len(pools.ground.p)
     met = _within(pools, pools.z[begun:], pools.group[begun:])
@@ -95,15 +99,27 @@ def _missing(eset: EquilibriumSet, places: list[dict[str, float]], seed: int) ->
     beside = _belonging(eset, join_states(structure, [hidden_islands(eset), _mirrored(eset)]))
     found = join_states(structure, [*searched, scattered[np.flatnonzero(resolved)]])
     told = (found, led.landed, met, beside)
-    lacking = join_states(structure, [_lacking(each, eset) for each in told])
+    entering = in_sides[np.flatnonzero(in_sides.resolved)]
+    lacking = join_states(structure, [*(_lacking(each, eset) for each in told), entering])
     dropped = [each.unresolved for each in searched if each.unresolved is not None]
     dropped += [_within(pools, *each) for each in pools.unresolved]
     dropped.append(scattered[np.flatnonzero(~resolved)])
+    dropped.append(in_sides[np.flatnonzero(~in_sides.resolved)])
     coarse = join_states(structure, dropped)
     good = structure.may_resolve(coarse.z, coarse.p)
     good &= are_feasible(eset.constraints, coarse.z, coarse.p)
     left_out = _lacking(coarse[np.flatnonzero(good)], eset)
-    return Check(len(found), lacking, led.outcomes, len(met), len(left_out))
+    return Check(len(found), lacking, led.outcomes, len(met), len(left_out), grazing)
+
+
+def _in_sides(eset: EquilibriumSet, generator: np.random.Generator) -> tuple[States, Places]:
+    """States in sides that a set lacks, and one place of those in each that are only folds."""
+    found = _lacking(states_in_sides(eset, SCATTERED // PER_FREE, generator), eset)
+    only = are_grazing(found)
+    places = found.p[only][:, eset.setting.free]
+    held = (places == eset.box.lower) * 1 + (places == eset.box.upper) * 2
+    _, first = np.unique(held, axis=0, return_index=True)
+    return found[np.flatnonzero(~only)], places[first]
 
 
 def _scattered(eset: EquilibriumSet, count: int, generator: np.random.Generator) -> States:

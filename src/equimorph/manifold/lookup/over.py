@@ -233,11 +233,12 @@ class Sheets:
         guess = self._guess(hits)
         wanted, room = self.cell_index[hits.cell], self._room[hits.cell]
         z, good, index = exact_states(self.structure, guess, at, wanted)
-        good &= (index == wanted) & (self.structure.resolved(z, at) | self._unresolved[hits.cell])
         mass, converged = self.structure.mass, good.copy()
+        good &= (index == wanted) & (self.structure.resolved(z, at) | self._unresolved[hits.cell])
         found = one_of_each((hits.point, hits.inside), (z, good), guess, room, mass, SAME_STATE)
         sure = balanced((hits.point, hits.cell, hits.inside), good, found, self._of_cells, len(p))
-        # in a tongue all corners may be near its folds, and states between them far from their own
+        # in a tongue all corners may be near its folds, and states between them far from their own;
+        # beside a side of the box guesses may lead across the fold of a narrow strip
         sure[hits.point[converged & ~good & hits.inside]] = False
         doubtful = None
         if not sure.all():
