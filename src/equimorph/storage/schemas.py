@@ -71,7 +71,7 @@ class Change:
 
 
 CHANGES: Mapping[str, Change] = {
-    "Audit": Change(version=7),
+    "Audit": Change(version=8),
     "LeastSnap": Change(version=2),
     "Proof": Change(version=3, removed=("status",)),  # it follows from `why` and `bounds`
     "Route": Change(version=4),  # older ones have no bottleneck, survival or relaxations

@@ -62,4 +62,5 @@ def are_grazing(states: States) -> Flags:
     critical = Critical(structure, z, p, null_border(structure, z, p))
     n = structure.unknowns
     length = np.sqrt(critical.v[:, :n] ** 2 @ structure.mass)
-    return np.abs(critical.g) * length <= SAME_SOLUTION * np.abs(critical.quadratic)
+    near = np.abs(critical.g) * length <= SAME_SOLUTION * np.abs(critical.quadratic)
+    return np.asarray(near)
