@@ -16,6 +16,7 @@ from equimorph.marching.kernels import (
     ENDED,
     HEAD,
     INDEX,
+    INLINE,
     ITERATION,
     LANE,
     LAST,
@@ -79,13 +80,13 @@ def begin(weight, mass, places, numbers, counts, ends, active):
             counts[STAGE, i] = ENDED
 
 
-@njit(**SUMS)
+@njit(**INLINE)
 def _copy(i, target, source):
     for j in range(source.shape[1]):
         target[i, j] = source[i, j]
 
 
-@njit(**SUMS)
+@njit(**INLINE)
 def _propose(i, mass, places, numbers, counts, ends):
     """Predict the trial point of lane i by the cubic through both ends."""
     start, one, slope_one, two, slope_two, trial, row = places
@@ -126,7 +127,7 @@ def shrink(values, new_tangent, mass, places, numbers, counts, ends, active):
                 _propose(i, mass, places, numbers, counts, ends)
 
 
-@njit(**SUMS)
+@njit(**INLINE)
 def _replace_end(i, value, new_tangent, places, numbers, ends):
     """Make the trial point the newest end of the bracket; the old one may become the other."""
     _, one, slope_one, two, slope_two, trial, _ = places
@@ -148,7 +149,7 @@ def _replace_end(i, value, new_tangent, places, numbers, ends):
     ends[RATE1, i] = norm
 
 
-@njit(**SUMS)
+@njit(**INLINE)
 def _next_share(i, ends):
     """Inverse quadratic interpolation where the three points allow it, else bisection."""
     x1, f1, x2, f2 = ends[X1, i], ends[F1, i], ends[X2, i], ends[F2, i]

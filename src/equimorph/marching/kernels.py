@@ -16,6 +16,9 @@ SUMS = {**FLAGS, "fastmath": {"contract", "reassoc"}, "_nrt": False}
 BRIEF = {**SUMS, "nogil": False}
 """Of kernels too short to let another thread in: taking turns would cost more than they do."""
 
+INLINE = {**SUMS, "forceinline": True}
+"""Of parts of the work on one lane: their many arrays, passed on the stack, would take longer."""
+
 (
     T, SLOPE, T_1, SLOPE_1, T_2, SLOPE_2, X_1, RATE_1, X_2, RATE_2, ARC, TRIAL, CORNER, DEFECT,
     LENGTH, TRAVELLED, LAST, WEIGHT, LARGEST, TURNING, NEW_SLOPE, NORM, TURN, DET_OLD, DET, NEW_DET,
@@ -113,7 +116,7 @@ def row_sums(a, b):
     return out
 
 
-@njit(**SUMS)
+@njit(**INLINE)
 def _size(i, dz, dt, mass, weight):
     """Length of a correction, with the multipliers included lightly."""
     n = mass.shape[0]
@@ -267,7 +270,7 @@ def judge(index, determinant, numbers, counts, active, smallest, locates, plain)
     return good, doubtful, close
 
 
-@njit(**SUMS)
+@njit(**INLINE)
 def _turns_twice(old, new, gain, length):
     """Whether t runs back inside a step that leaves it rising, or falling, at both ends.
 
@@ -288,7 +291,7 @@ def _turns_twice(old, new, gain, length):
     return least < -max(SLACK * min(a, b), ROUND_OFF / length)
 
 
-@njit(**SUMS)
+@njit(**INLINE)
 def _dips(i, share, numbers):
     """Whether the determinant may touch zero, or cross it twice, inside a step.
 
@@ -309,7 +312,7 @@ def _dips(i, share, numbers):
     return here - slope * slope / (4.0 * bow) < share * min(here, there)
 
 
-@njit(**SUMS)
+@njit(**INLINE)
 def _lowest(i, numbers):
     """Whether the determinant is much smaller here than one step before and at the end."""
     before, here, there = numbers[DET_OLD, i], numbers[DET, i], numbers[NEW_DET, i]
@@ -317,7 +320,7 @@ def _lowest(i, numbers):
     return numbers[ARC, i] > 0.0 and before * there > 0.0 and abs(here) < NEAR * sides
 
 
-@njit(**SUMS)
+@njit(**INLINE)
 def _hides_early(i, numbers):
     """Whether the determinant may touch zero, or cross it twice, in the first step of a lane.
 

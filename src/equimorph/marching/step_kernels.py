@@ -18,6 +18,7 @@ from equimorph.marching.kernels import (
     ENDED,
     HEAD,
     INDEX,
+    INLINE,
     ITERATION,
     KNOWN,
     LANE,
@@ -75,29 +76,27 @@ def proceed(move, mass, knobs, places, numbers, counts, active, smallest):
         stage = counts[STAGE, i]
         if stage == STARTING:
             _start(i, move, mass, knobs, places, numbers, counts)
-            stuck = counts[STAGE, i] == STUCK
-            finished, given_up = finished + stuck, given_up + stuck
-            continue
-        if stage not in (CONVERGED, REFUSED):
+        elif stage in (CONVERGED, REFUSED):
+            if stage == CONVERGED:
+                _take_over(i, move[1], places, numbers, counts)
+            else:
+                numbers[LENGTH, i] *= BACK
+            counts[STEPS, i] += 1
+            if not numbers[LENGTH, i] >= smallest:
+                counts[STAGE, i] = SHORT
+            elif counts[STEPS, i] >= counts[MOST, i]:
+                counts[STAGE, i] = LONG
+        else:
             finished += stage == ENDED
             continue
-        if stage == CONVERGED:
-            _take_over(i, move[1], places, numbers, counts)
+        if counts[STAGE, i] > ENDED:
+            finished, given_up = finished + 1, given_up + 1
         else:
-            numbers[LENGTH, i] *= BACK
-        counts[STEPS, i] += 1
-        if not numbers[LENGTH, i] >= smallest:
-            counts[STAGE, i] = SHORT
-        elif counts[STEPS, i] >= counts[MOST, i]:
-            counts[STAGE, i] = LONG
-        else:
-            predict(i, mass, places, numbers, counts)
-            continue
-        finished, given_up = finished + 1, given_up + 1
+            _predict(i, mass, places, numbers, counts)
     return finished, given_up
 
 
-@njit(**SUMS)
+@njit(**INLINE)
 def _take_over(i, new_tangent, places, numbers, counts):
     """Make the end of an accepted step the place of the lane, and choose the next length."""
     z, tangent, trial, _ = places
@@ -125,7 +124,7 @@ def _take_over(i, new_tangent, places, numbers, counts):
     numbers[ARC, i], numbers[BEND, i] = arc, turn / arc
 
 
-@njit(**SUMS)
+@njit(**INLINE)
 def _before_bends(i, length, arc, bend, numbers):
     """Shorten a step that would turn too far if the curvature of the path grows on as it did.
 
@@ -142,8 +141,8 @@ def _before_bends(i, length, arc, bend, numbers):
     return length
 
 
-@njit(**SUMS)
-def predict(i, mass, places, numbers, counts):
+@njit(**INLINE)
+def _predict(i, mass, places, numbers, counts):
     """Guess the end of the next step of lane i, and prepare the equation that closes it.
 
     That is the pseudo-arclength, which the guess obeys already, or the end of t where the step
@@ -169,7 +168,7 @@ def predict(i, mass, places, numbers, counts):
         numbers[TRIAL, i], numbers[CORNER, i] = goal, 1.0
 
 
-@njit(**SUMS)
+@njit(**INLINE)
 def _look_back(i, mass, places, numbers, counts):
     """Where the points before lie along the present tangent, whose row is left in `places`.
 
@@ -198,14 +197,14 @@ def _look_back(i, mass, places, numbers, counts):
         numbers[X_1 + 2 * back, i], numbers[RATE_1 + 2 * back, i] = along, rate
 
 
-@njit(**SUMS)
+@njit(**INLINE)
 def _before(i, steps, counts):
     """Which of the remembered points of lane i was the present one so many steps ago."""
     then = counts[HEAD, i] - min(steps, counts[KNOWN, i])
     return then if then >= 0 else then + MEMORY
 
 
-@njit(**SUMS)
+@njit(**INLINE)
 def _weights(i, x, numbers, counts):
     """Factors of a polynomial at x: of the points before less the present one, of all tangents.
 
@@ -231,7 +230,7 @@ def _weights(i, x, numbers, counts):
     )
 
 
-@njit(**SUMS)
+@njit(**INLINE)
 def _predicted(i, factors, numbers):
     """Predict t at the end of a step."""
     one, two, here, slope_one, slope_two = factors
@@ -255,7 +254,7 @@ def _length_to(i, goal, numbers, counts):
     return high
 
 
-@njit(**SUMS)
+@njit(**INLINE)
 def _guess(i, factors, places, counts):
     """Predict the point at the end of the step."""
     z, tangent, trial, _ = places
@@ -271,7 +270,7 @@ def _guess(i, factors, places, counts):
 
 @njit(**SUMS)
 def _start(i, move, mass, knobs, places, numbers, counts):
-    """Take lane i over to its corrected start, and predict its first step unless it leads nowhere.
+    """Take lane i over to its corrected start, which may lead nowhere.
 
     `knobs`: first and largest step, turning and most steps for each level of retries.
     """
@@ -292,9 +291,7 @@ def _start(i, move, mass, knobs, places, numbers, counts):
     counts[INDEX, i] = index[i]
     # the slope per length, however far the goal is
     steep = numbers[SLOPE, i] * max(1.0, np.sqrt(numbers[WEIGHT, i]))
-    if np.isfinite(total) and steep > LEVEL_SLOPE:
-        predict(i, mass, places, numbers, counts)
-    else:
+    if not (np.isfinite(total) and steep > LEVEL_SLOPE):
         counts[STAGE, i] = STUCK
 
 
