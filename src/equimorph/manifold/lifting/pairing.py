@@ -234,9 +234,8 @@ class Pairing:
         """Rays with a certain mark: each edge from one end, so that no curve is traced twice."""
         count = self.points.count
         vertex = self.points.vertex[:count]
-        chosen = (self.rays[:count] == mark) & (vertex >= 0)[:, None]
-        points, slots = np.nonzero(chosen)
-        edges = self.incident[vertex[points], slots]
+        points, slots = np.divmod(np.flatnonzero(self.rays[:count] == mark), self.rays.shape[1])
+        edges = np.where(vertex[points] >= 0, self.incident[vertex[points], slots], -1)
         points, edges = points[edges >= 0], edges[edges >= 0]
         sides = (self.mesh.edges[edges, 1] == vertex[points]).astype(int)
         from_first = np.zeros(len(self.mesh.edges), bool)

@@ -173,6 +173,8 @@ def _pressing(
 
     Those may cross a fold that bulges out between its vertices.
     """
+    if not failed.any():
+        return failed
     reach = np.full(int(ends.max(initial=0)) + 1, np.inf)
     for side in range(2):
         np.minimum.at(reach, ends[failed, side], length[failed])
