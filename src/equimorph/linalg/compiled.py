@@ -84,6 +84,8 @@ def kept_signatures(kernel: Any) -> list[Any]:
 
 def is_awaited(kernel: Any) -> bool:
     """Whether another process still compiles a kernel that this one can do without."""
+    if not AWAITED:
+        return False
     name = f"{kernel.py_func.__module__}.{kernel.py_func.__name__}"
     if name in AWAITED and kept_signatures(kernel):
         AWAITED.remove(name)

@@ -128,6 +128,20 @@ def multiply_lanes(x, matrix, out):
 
 
 @njit(**FLAGS)
+def largest_products(x, matrix, out):
+    """Largest entries, by size, of rows of x times a matrix."""
+    for lane in range(x.shape[0]):
+        largest = 0.0
+        for j in range(matrix.shape[0]):
+            total = 0.0
+            for i in range(matrix.shape[1]):
+                total += x[lane, i] * matrix[j, i]
+            if not abs(total) <= largest:
+                largest = abs(total)
+        out[lane] = largest
+
+
+@njit(**FLAGS)
 def orthonormal_lanes(rows, count, weights):
     """Make the first rows of each lane orthonormal, and the others orthogonal to these; in place.
 

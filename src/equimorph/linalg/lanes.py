@@ -132,6 +132,11 @@ def threads() -> int:
     return 1 if hasattr(_worker, "own") else _number.chosen
 
 
+def shares_of(lanes: int) -> int:
+    """Return how many threads share lanes; fewer than two: the calling one computes them all."""
+    return min(threads(), lanes // SMALLEST_SHARE)
+
+
 def over_lanes(
     kernel: Callable[..., Any],
     shared: tuple[Any, ...],
@@ -151,8 +156,7 @@ def over_lanes(
         for array, result in zip(outputs, wide, strict=True):
             array[:] = result[:lanes]
         return
-    shares = lanes // SMALLEST_SHARE
-    shares = min(threads(), shares)
+    shares = shares_of(lanes)
     if shares < 2:
         kernel(*shared, *inputs, *outputs)
         return

@@ -206,8 +206,11 @@ class Box:
         self, points: Float[np.ndarray, "*lanes d"], slack: float = 0.0
     ) -> "np.ndarray[tuple[int, ...], np.dtype[np.bool_]]":
         """Like `contains`, without checks, for points that the package has computed."""
-        room = slack * (self.upper - self.lower)
-        inside = (points >= self.lower - room) & (points <= self.upper + room)
+        inside = points >= self.lower
+        inside &= points <= self.upper
+        if slack and not inside.all():
+            room = slack * (self.upper - self.lower)
+            inside = (points >= self.lower - room) & (points <= self.upper + room)
         return np.asarray(inside.all(axis=-1))
 
 

@@ -34,6 +34,30 @@ class Advance:
     determinant: Values
 
 
+@dataclass(frozen=True)
+class CompiledNewton:
+    """Newton's method at fixed parameters as one loop over the kernel of a structure's step.
+
+    Its results are those of `Equations.advance`.
+
+    Parameters
+    ----------
+    run
+        `newton_kernels.newton_of`, made with the structure's step.
+    tables
+        What it shares among lanes.
+    guard
+        Least ratio of the pivots of a step; below it `Equations.advance` takes the step.
+    widths
+        Entries of z and p.
+    """
+
+    run: Callable[..., tuple[int, int]]
+    tables: tuple[tuple[np.ndarray, ...], ...]
+    guard: float
+    widths: tuple[int, int]
+
+
 AnyBorder = Border | None
 """Columns, rows and corner around a matrix, or none."""
 Shift = Values | None
@@ -146,6 +170,11 @@ class Equations(ABC):
         columns = self.parameter_derivative(*many) if k else np.zeros((0, size))
         solve = partial(self.solve, z, p)
         return LinearSystem(self.residual(z, p), columns.reshape(lanes, k, size), solve)
+
+    @property
+    def compiled_newton(self) -> CompiledNewton | None:
+        """Newton's method at fixed parameters, compiled as a whole; None: it is not."""
+        return None
 
     def advance(
         self, z: Lanes, p: Parameters, dp: Parameters, row: Lanes, corner: Values, defect: Values

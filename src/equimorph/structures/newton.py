@@ -12,9 +12,11 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 
 from equimorph.arrays import Flags, Float, Int, Lanes, Parameters, Values
+from equimorph.linalg.compiled import is_awaited
+from equimorph.linalg.lanes import shares_of
 from equimorph.linalg.simd import LANES
 from equimorph.structures import newton_kernels
-from equimorph.structures.equations import Advance
+from equimorph.structures.equations import Advance, CompiledNewton
 from equimorph.structures.newton_kernels import correct_lanes
 from equimorph.tolerances import CONVERGED
 
@@ -32,6 +34,10 @@ class Steps(Protocol):
     @property
     def mass(self) -> Float[np.ndarray, " unknowns"]:
         """Diagonal of the mass matrix."""
+
+    @property
+    def compiled_newton(self) -> CompiledNewton | None:
+        """Newton's method at fixed parameters, compiled as a whole; None: it is not."""
 
     def advance(
         self, z: Lanes, p: Parameters, dp: Parameters, row: Lanes, corner: Values, defect: Values
@@ -145,29 +151,47 @@ def newton(
     (lanes, size), k = z.shape, 0 if through is None else 1
     # structures compute whole blocks of lanes: the rest of one goes with the first lane
     rows = np.arange(lanes) if lanes >= LANES else _FILLED[lanes]
-    z, p, most = z.take(rows, axis=0), p.take(rows, axis=0), len(rows)
-    zero, one, still = np.zeros(most), np.ones(most), np.zeros((most, size))
-    if through is None:
-        velocity, row, corner, moved = np.zeros(p.shape), still, one, (p[:, :0], still[:, :0], one)
-    else:
-        moved = (velocity, row, corner) = through.take(rows)
-    work = (rows.copy(), np.full(most, np.inf), z, p, *moved)
+    most = len(rows)
+    still = (np.zeros((most, 0)), np.zeros((most, 0)), np.ones(most))
+    moved = still if through is None else through.take(rows)
+    work = (rows.copy(), np.full(most, np.inf), z.take(rows, axis=0), p.take(rows, axis=0), *moved)
     result = _nothing(lanes, size, p.shape[1], k)
     exempt = np.zeros((lanes, 0), int) if limits.exempt is None else limits.exempt[:, None]
     weights = np.full(size, float(limits.multipliers))
     weights[: equations.unknowns] = equations.mass
-    guards, lengths, left = (limits.too_long_of(lanes), exempt), limits.lengths, lanes
-    longest = float(limits.longest)
-    for number in range(1, limits.iterations + 1):
-        if left == 0:
-            break
-        m = max(left, LANES)
-        step = equations.advance(z[:m], p[:m], velocity[:m], row[:m], corner[:m], zero[:m])
-        free = number <= limits.free or limits.contraction == np.inf
-        rule = (free, number >= limits.iterations, number == 1)
-        given = (step.dz, step.dt, step.index, step.tangent_z, step.tangent_t)
-        left = correct_lanes(given, work, left, result, guards, weights, lengths, longest, rule)
+    given = result, (limits.too_long_of(lanes), exempt), weights, limits.lengths
+    longest, left, number = float(limits.longest), lanes, 0
+    free = limits.iterations if limits.contraction == np.inf else limits.free
+    loop = _loop_of(equations, work) if through is None else None
+    while left > 0 and number < limits.iterations:
+        if loop is not None:
+            rule, progress = (longest, free, limits.iterations), (left, number)
+            left, number = loop.run(loop.tables, loop.guard, work, progress, *given, rule)
+            if left == 0 or number == limits.iterations:
+                break
+        number += 1
+        step = _step(equations, work, max(left, LANES))
+        stage = (number <= free, number >= limits.iterations, number == 1)
+        left = correct_lanes(step, work, left, *given, longest, stage)
     return Newton(*result)
+
+
+def _loop_of(equations: Steps, work: tuple[np.ndarray, ...]) -> CompiledNewton | None:
+    """The compiled loop, if there is one that the lanes at work fit, and threads share no lanes."""
+    z, p = work[2:4]
+    loop = equations.compiled_newton if shares_of(len(z)) < 2 else None
+    if loop is None or (z.shape[1], p.shape[1]) != loop.widths or is_awaited(loop.run):
+        return None
+    return loop
+
+
+def _step(equations: Steps, work: tuple[np.ndarray, ...], m: int) -> tuple[np.ndarray, ...]:
+    """One step of the first m lanes at work, as `correct_lanes` takes it."""
+    z, p, dp, row, corner = (each[:m] for each in work[2:])
+    if dp.shape[1] == 0:  # at fixed parameters
+        dp, row = np.zeros(p.shape), np.zeros(z.shape)
+    step = equations.advance(z, p, dp, row, corner, np.zeros(m))
+    return step.dz, step.dt, step.index, step.tangent_z, step.tangent_t
 
 
 _FILLED = [np.arange(LANES if lanes else 0) % max(lanes, 1) for lanes in range(LANES)]

@@ -2,10 +2,11 @@
 
 import numpy as np
 
-from equimorph.linalg.compiled import njit
+from equimorph.linalg.compiled import njit, template
 from equimorph.linalg.kernels import FLAGS, INNER
 from equimorph.linalg.row_kernels import copy_row
 from equimorph.linalg.simd import LANES
+from equimorph.marching.tick_kernels import any_below
 
 OPEN, FOUND, UNFINISHED, SINGULAR, TOO_LONG, NOT_SHRINKING = range(-1, 5)
 """How a lane stands after a step; `Status` of `equilibria.settle` says what these mean."""
@@ -103,3 +104,43 @@ def correct_lanes(step, work, count, result, guards, weights, limits, longest, r
                 copy_row(dp, 0, dp, i)
                 copy_row(row, 0, row, i)
     return left
+
+
+def newton_of(step):
+    """Newton's method at fixed parameters as one loop, with the kernel of a structure's step.
+
+    The kernel is as that of `marching.tick_kernels.march_of`.
+    """
+
+    @template(**FLAGS)
+    def iterate(work, tables, guard, lanes, progress, result, guards, weights, limits, rule):
+        """Correct lanes until all are finished, or a pivot is unsafe; return those left, and steps.
+
+        lanes, result, guards, weights, limits: see `correct_lanes`; progress: lanes left and steps
+        taken before; guard: least ratio of the pivots; rule: longest step, steps that need not
+        shrink, and most steps.
+        """
+        z, p = lanes[2], lanes[3]
+        (left, number), (longest, free, most), (rows, size) = progress, rule, z.shape
+        still_z, still_p, none = np.zeros((rows, size)), np.zeros(p.shape), np.zeros(rows)
+        one, index = np.ones(rows), np.empty(rows, np.int64)
+        dz, tangent_z = np.empty((rows, size)), np.empty((rows, size))
+        dt, tangent_t, residual = np.empty(rows), np.empty(rows), np.empty(rows)
+        determinant, ratio = np.empty(rows), np.empty(rows)
+        while left > 0 and number < most:
+            m = max(left, LANES)
+            step(
+                work, tables, z[:m], p[:m], still_p, still_z, one, none, dz, dt, tangent_z,
+                tangent_t, residual, index, determinant, ratio,
+            )  # fmt: skip
+            if any_below(ratio, left, guard):
+                break
+            number += 1
+            moves = (dz, dt, index, tangent_z, tangent_t)
+            stage = (number <= free, number >= most, number == 1)
+            left = correct_lanes(
+                moves, lanes, left, result, guards, weights, limits, longest, stage
+            )
+        return left, number
+
+    return iterate

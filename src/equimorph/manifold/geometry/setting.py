@@ -20,7 +20,8 @@ class Setting:
 
     def parameters(self, points: Float[np.ndarray, "some d"]) -> Float[np.ndarray, "some P"]:
         """All parameters over points of the box."""
-        p = np.tile(self.base, (len(points), 1))
+        p = np.empty((len(points), len(self.base)))
+        p[:] = self.base
         p[:, self.free] = points
         return p
 

@@ -19,6 +19,7 @@ from equimorph.structures.contract import Readers, Symmetry, Written
 from equimorph.structures.equations import (
     Advance,
     AnyBorder,
+    CompiledNewton,
     Direction,
     Enclosed,
     LinearSystem,
@@ -201,6 +202,11 @@ class AnyRod(HeavyRod, Refinable):
     ) -> Advance:
         """One Newton step, with tangent and inertia."""
         return self.mechanics.advance(z, p, dp, row, corner, defect)
+
+    @property
+    def compiled_newton(self) -> CompiledNewton | None:
+        """Newton's method of the mechanics, if it is compiled."""
+        return self.mechanics.compiled_newton
 
     def index(self, z: Lanes, p: Parameters) -> Int[np.ndarray, " lanes"]:
         """Negative eigenvalues of the constrained Hessian."""

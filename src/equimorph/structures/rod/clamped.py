@@ -10,12 +10,20 @@ import numpy as np
 from numpy.polynomial import legendre, polynomial
 
 from equimorph.arrays import Float, Lanes, Nodal, Parameters, Sides, Values, Velocity
-from equimorph.linalg import BorderedSolution, CondensedLayout, multiply, no_border
+from equimorph.linalg import BorderedSolution, CondensedLayout, no_border
 from equimorph.linalg.condensed import PIVOT_GUARD
 from equimorph.linalg.lanes import over_lanes
 from equimorph.structures.contract import CompiledSteps, Symmetry
-from equimorph.structures.equations import Advance, AnyBorder, Direction, LinearSystem, Shift
+from equimorph.structures.equations import (
+    Advance,
+    AnyBorder,
+    CompiledNewton,
+    Direction,
+    LinearSystem,
+    Shift,
+)
 from equimorph.structures.rod.clamped_derivative_kernels import (
+    energy_lanes,
     linearise_lanes,
     matrix_lanes,
     parameter_lanes,
@@ -24,7 +32,7 @@ from equimorph.structures.rod.clamped_derivative_kernels import (
 )
 from equimorph.structures.rod.clamped_field_kernels import fields_lanes, largest_lanes
 from equimorph.structures.rod.clamped_kernels import advance_lanes
-from equimorph.structures.rod.clamped_march_kernels import march_lanes, search_lanes
+from equimorph.structures.rod.clamped_march_kernels import march_lanes, newton_lanes, search_lanes
 from equimorph.structures.rod.discretisation import Mesh, reference_element
 from equimorph.structures.rod.inertia import inextensible_force, inextensible_inertia
 from equimorph.structures.rod.mechanics import Bounds, PlanarMechanics
@@ -113,9 +121,10 @@ class ClampedMechanics(PlanarMechanics):
 
     def energy(self, z: Lanes, p: Parameters) -> Values:
         """∫ θ'²/(8π²) − q ∫ ρ sin θ."""
-        theta = self.nodal_angles(z, p)
-        bending = 0.5 * np.einsum("li,li->l", multiply(theta, self.layout.assembled), theta)
-        return np.asarray(bending - p[:, 2] * multiply(np.sin(theta), self.loads))
+        z, p = self.check_widths((z, p))
+        out = np.empty(len(z))
+        energy_lanes(self.layout.stiffness, self.loads, z, p, out)
+        return out
 
     def residual(self, z: Lanes, p: Parameters) -> Lanes:
         """(∂L/∂θ at the inner nodes, ∫cos θ − ν, ∫ sin θ)."""
@@ -208,6 +217,13 @@ class ClampedMechanics(PlanarMechanics):
         """One fused kernel."""
         given = (z, p, dp, row, corner, defect)
         return self.fused_advance(advance_lanes, self._step_data, *given)
+
+    @cached_property
+    def compiled_newton(self) -> CompiledNewton:
+        """The loop over the fused step."""
+        return CompiledNewton(
+            newton_lanes, (self._step_data,), PIVOT_GUARD, (self.size, PARAMETERS)
+        )
 
     def compiled_steps(self, bounds: Bounds) -> CompiledSteps:
         """Loops over the fused step and the search for the largest curvature."""

@@ -24,6 +24,27 @@ def _write_closing(n, along, across, rows, target, start):
 
 
 @njit(**FLAGS)
+def energy_lanes(stiffness, loads, z, p, energy):
+    """½ θᵀKθ − q Σᵢ Rᵢ sin θᵢ of every lane, one by one."""
+    elements, degree, n = stiffness.shape[0], stiffness.shape[1] - 1, z.shape[1] - 2
+    theta = np.empty(n + 2)
+    for lane in range(z.shape[0]):
+        theta[0], theta[n + 1] = p[lane, 1] + p[lane, 0], p[lane, 1] - p[lane, 0]
+        for i in range(n):
+            theta[i + 1] = z[lane, i]
+        bending, lift = 0.0, 0.0
+        for i in range(n + 2):
+            lift += loads[i] * np.sin(theta[i])
+        for e in range(elements):
+            for i in range(degree + 1):
+                moment = 0.0
+                for j in range(degree + 1):
+                    moment += stiffness[e, i, j] * theta[e * degree + j]
+                bending += theta[e * degree + i] * moment
+        energy[lane] = 0.5 * bending - p[lane, 2] * lift
+
+
+@njit(**FLAGS)
 def residual_lanes(stiffness, weights, loads, z, p, residual, ends):
     """F of every lane, and the derivatives by the ends and the load: ends (lanes, 3)."""
     elements, degree, n = stiffness.shape[0], stiffness.shape[1] - 1, z.shape[1] - 2

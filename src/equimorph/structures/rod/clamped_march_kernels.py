@@ -1,4 +1,4 @@
-"""The march, and the search for events, of the rod between clamps: compiled as a whole.
+"""The march, the search for events, and Newton's method of the rod between clamps, as a whole.
 
 Constraints are bounds on the largest curvature, one a row: sign, unit, bound and ease.
 """
@@ -9,6 +9,7 @@ from equimorph.linalg.compiled import njit
 from equimorph.linalg.kernels import FLAGS
 from equimorph.marching.search_kernels import search_of
 from equimorph.marching.tick_kernels import march_of
+from equimorph.structures.newton_kernels import newton_of
 from equimorph.structures.rod.clamped_field_kernels import largest_in, largest_work
 from equimorph.structures.rod.clamped_kernels import advance_in, advance_work
 
@@ -46,6 +47,7 @@ def _compare(largest, bounds, k, count, found):
 
 
 _march, _search = march_of(_step, _excess), search_of(_step, _excess)
+_newton = newton_of(_step)
 
 
 @njit(**FLAGS)
@@ -67,3 +69,10 @@ def search_lanes(tables, bounds, problem, block, move, scratch, values, root):
     """Find roots on straight lines; see `marching.search_kernels.search_of`."""
     work = _work(tables, block[0][5].shape[0])
     return _search(work, tables, bounds, problem, block, move, scratch, values, root)
+
+
+@njit(**FLAGS)
+def newton_lanes(tables, guard, lanes, progress, result, guards, weights, limits, rule):
+    """Correct guesses at fixed parameters; see `structures.newton_kernels.newton_of`."""
+    work = (advance_work(tables[0][0]),)
+    return _newton(work, tables, guard, lanes, progress, result, guards, weights, limits, rule)

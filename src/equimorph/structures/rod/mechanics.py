@@ -8,9 +8,9 @@ import numpy as np
 
 from equimorph.arrays import Flags, Float, Lanes, Nodal, Parameters, Values, Velocity
 from equimorph.errors import InputError
-from equimorph.linalg import multiply
 from equimorph.linalg.condensed import PIVOT_GUARD
 from equimorph.linalg.intervals import Interval
+from equimorph.linalg.kernels import largest_products
 from equimorph.linalg.lanes import over_lanes
 from equimorph.structures.contract import CompiledSteps, Symmetry
 from equimorph.structures.equations import Advance, Direction, Enclosed, Equations
@@ -214,8 +214,9 @@ class PlanarMechanics(RodMechanics):
 
     def tail(self, z: Lanes, p: Parameters) -> Values:
         """Largest of the two highest Legendre coefficients of θ in all elements."""
-        tail = multiply(self.nodal_angles(z, p), self.mesh.highest.T)
-        return np.asarray(np.abs(tail, out=tail).max(axis=1))
+        out = np.empty(len(z))
+        largest_products(np.ascontiguousarray(self.nodal_angles(z, p)), self.mesh.highest, out)
+        return out
 
 
 SAMPLES = np.linspace(0.0, 1.0, 25)

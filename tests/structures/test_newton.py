@@ -1,0 +1,54 @@
+"""Newton's method as one compiled loop against the same step by step."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import equimorph as em
+from equimorph.structures.newton import Limits, newton
+
+LIMITS = Limits(12, 0.7, 2.0, 1e-14, following=1e-14, contraction=0.9, free=2)
+
+
+@pytest.fixture
+def guesses():
+    rod = em.Rod(load="uniform")
+    p = np.tile([1.0, 0.1, 2.5, np.sin(1.0)], (23, 1))
+    return rod, rod.sample(p, np.random.default_rng(2)), p
+
+
+@pytest.mark.parametrize("lanes", [0, 1, 8, 23])
+@pytest.mark.parametrize("guard", [1e-3, np.inf])
+def test_the_compiled_loop_takes_the_steps_of_the_structure(guesses, lanes, guard):
+    """Bit by bit, whether no, some or all steps (an infinite guard) are taken by `advance`."""
+    rod, z, p = guesses
+    found = newton(rod, z[:lanes], p[:lanes], LIMITS)
+    rod.mechanics.compiled_newton = replace(rod.compiled_newton, guard=guard)
+    plain = newton(rod, z[:lanes], p[:lanes], LIMITS)
+    if guard == np.inf:
+        for one, other in zip(vars(found).values(), vars(plain).values(), strict=True):
+            np.testing.assert_array_equal(one, other)
+    np.testing.assert_array_equal(found.status, plain.status)
+    if lanes == 23:
+        assert 0 < found.found.sum() < lanes
+
+
+def test_states_of_another_width_are_refused_by_name(guesses):
+    """The loop does not check what it reads: `advance` refuses."""
+    rod, z, p = guesses
+    with pytest.raises(em.InputError, match="`z` must have shape"):
+        newton(rod, z[:, :-1], p, LIMITS)
+
+
+def test_energy_and_highest_coefficients_are_those_of_matrices(guesses):
+    """½ θᵀKθ − q R·sin θ, and the largest product with the rows of `highest`, by numpy."""
+    rod, z, p = guesses
+    mechanics = rod.mechanics
+    theta = mechanics.nodal_angles(z, p)
+    bending = 0.5 * np.einsum("li,ij,lj->l", theta, mechanics.layout.assembled, theta)
+    energy = bending - p[:, 2] * (np.sin(theta) @ mechanics.loads)
+    np.testing.assert_allclose(mechanics.energy(z, p), energy, rtol=1e-13)
+    largest = np.abs(theta @ mechanics.mesh.highest.T).max(axis=1)
+    # sums of angles near one, which cancel
+    np.testing.assert_allclose(mechanics.tail(z, p), largest, rtol=1e-12, atol=1e-14)
