@@ -408,3 +408,16 @@ def test_wrong_masses_are_refused(given, why):
     """One line each."""
     with pytest.raises(InputError, match=why):
         em.Rod(**given)
+
+
+def test_states_that_turn_for_nothing_are_refused_in_frames_in_space():
+    """A bent round column between coaxial clamps: frequencies were 4e-7, ∞, ∞."""
+    ends = {"A": "fixed", "B": "fixed"}
+    member = em.SpatialMember(("A", "B"), EI=1.0, GJ=0.8, EA=1000.0, mass=1.0)
+    loads, shorter = {"w": {"A-B": (0, 1, 0)}}, {"m": {"move": {"B": (-1, 0, 0)}}}
+    joints = {"A": (0, 0, 0), "B": (1, 0, 0)}
+    frame = em.SpatialFrame(joints, [member], ends, loads, shorter, elements=3)
+    pushed = em.lift(frame.natural_state(), [{"w": 2.0}, {"m": 0.25}]).end.state
+    assert (pushed.natural_frequencies(3) < 50.0).all()
+    with pytest.raises(em.InputError, match="must be stable to vibrate"):
+        em.lift(pushed, {"w": 0.0}).end.state.natural_frequencies(3)

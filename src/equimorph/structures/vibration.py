@@ -19,6 +19,8 @@ SWEEPS = 80
 """Most steps of subspace iteration."""
 CROWDED = 0.8
 """Share of 1/ω² of the last mode asked for above which the last vector is too near to it."""
+CRITICAL = 1e-13
+"""Ratio of ω₁² to the next mode's below which ω₁ is round-off."""
 RELATIVE = 1e-12
 """Relative change of all frequencies' squares that counts as none."""
 
@@ -46,8 +48,8 @@ def vibrations(structure: Structure, z: Lanes, p: Parameters, count: int) -> Vib
     Raises
     ------
     InputError
-        For a state that is not stable, about which no small movement stays small, for more modes
-        than unknowns, or a structure without mass.
+        For a state that is not stable or critical, about which no small movement stays small, for
+        more modes than unknowns, or a structure without mass.
 
     References
     ----------
@@ -63,6 +65,7 @@ def vibrations(structure: Structure, z: Lanes, p: Parameters, count: int) -> Vib
     free = moving.coordinates - structure.constraints
     if not 1 <= count <= free:
         raise InputError(f"`count` must be from 1 to {free}, the free movements; got {count!r}.")
+    _check_regular(moving, len(z))
     generator, more = np.random.default_rng(0), min(count + GUARD, moving.coordinates)
     vectors, crowded = np.zeros((len(z), 0, moving.coordinates)), True
     while more and crowded:
@@ -124,6 +127,31 @@ class _Moving:
             return np.asarray(v - (v @ heavy.transpose(0, 2, 1)) @ share)
 
         return cls(count, inertia, response, across)
+
+
+def _check_regular(moving: _Moving, lanes: int) -> None:
+    """Refuse critical states, whose softest movement hides all others in round-off.
+
+    That movement answers a first push; a second one, orthogonal to it in M, does not excite it.
+    """
+    first, second = np.random.default_rng(1).normal(size=(2, lanes, 1, moving.coordinates))
+    first, second = moving.across(first), moving.across(second)
+
+    def square(v: np.ndarray, w: np.ndarray) -> np.ndarray:
+        return np.asarray((moving.inertia(v) * w).sum(axis=2, keepdims=True))
+
+    soft = moving.response(moving.inertia(first))
+    others = second - square(soft, second) / square(soft, soft) * soft
+    some = square(others, others) > CRITICAL * square(second, second)
+    stiff = moving.response(moving.inertia(others))
+    by_soft = square(soft, soft) * square(others, others)
+    by_others = square(stiff, stiff) * square(first, first)
+    critical = np.flatnonzero(some & (by_others < CRITICAL**2 * by_soft))
+    if len(critical):
+        raise InputError(
+            "`state` must be stable to vibrate; got a critical one, which can move without force, "
+            f"state {int(critical[0])} of {lanes}."
+        )
 
 
 def _lowest(

@@ -39,6 +39,8 @@ from equimorph.structures.unit_system import Quantity, Units as SystemSpec, unit
 
 ARCS = 128
 """Number of cubic arcs along a rod: their error is below 1e-10 for κ = 10."""
+NEXT = 1e-4
+"""Arclength to neighbouring places whose differences are the derivatives of places."""
 ENDLESS = 20.0
 """Curvature, times the length, that is proposed as the bound of a set."""
 BOUNDING = {*((f"max_{name}", "<=") for name in ("curvature", "strain", "stress")),
@@ -251,9 +253,19 @@ class AnyRod(HeavyRod, Refinable):
         return self.places(z, p, arclengths(s))
 
     def arcs(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes arcs 4 axes"]:
-        """Shape as cubic arcs with the rod's positions and tangents at their ends."""
-        line = self.centreline(z, p, np.linspace(0.0, 1.0, ARCS + 1))
-        return smooth_arcs(line.places, line.tangents, line.length / ARCS)
+        """Shape as cubic arcs with the rod's positions and their derivatives at their ends.
+
+        Those are of the parabola through three places beside the end, which know stretch and shear.
+        All three lie on one side, as fields that are no equilibrium may jump where elements meet.
+        """
+        s = np.linspace(0.0, 1.0, ARCS + 1)
+        side = np.where(s < 0.5, NEXT, -NEXT)
+        points = s + np.array([[0.5], [1.5], [2.5]]) * side
+        near, middle, far = np.split(self.places(z, p, points.ravel()), 3, axis=1)
+        bend = far - 2.0 * middle + near
+        slope = middle - near - bend
+        rate = slope / side[:, None]
+        return smooth_arcs(near - 0.5 * slope - 0.125 * bend, rate, 1.0 / ARCS)
 
     # --- natural states -------------------------------------------------------------------------
 
