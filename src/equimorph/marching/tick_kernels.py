@@ -197,14 +197,17 @@ def march_of(step, excess):
     ----------
     step, excess
         Kernels ``step(work, tables, z, p, dp, row, corner, defect, *move)``, and
-        ``excess(work, tables, z, p, bounds, found)`` for values of constraints (constraints, rows).
-        They need at least a vector of rows; `work` are their arrays, `tables` what lanes share.
+        ``excess(work, tables, z, p, bounds, found)`` for values of constraints (constraints, rows),
+        if there are any. They need at least a vector of rows; `work` are their arrays, `tables`
+        what lanes share.
     """
 
     @template(**FLAGS)
     def measure(work, tables, bounds, line, block, scratch):
         """Values of constraints at starts and ends of good steps; how many steps may graze one."""
         places, _, numbers, counts, values, grazing, state = block
+        if grazing.shape[0] == 0:
+            return 0
         _, _, z, p, at, found = scratch
         count = gather(line, places[2], numbers, counts, state[ACTIVE], z, p, at)
         if count > 0:

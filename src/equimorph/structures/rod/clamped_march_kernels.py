@@ -28,8 +28,6 @@ def _step(
 
 @njit(**{**FLAGS, "_nrt": False})
 def _excess(work, tables, z, p, bounds, found):
-    if bounds.shape[0] == 0:
-        return
     stiffness, pressures, breaks, nodes, integral, rho, rises = tables[1]
     largest, place = work[2], work[3]
     largest_in(
