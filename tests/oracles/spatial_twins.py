@@ -25,6 +25,26 @@ def equations(mechanics, z, p, *directions):
     return np.concatenate([out.reshape(*out.shape[:2], mechanics.unknowns), closing], axis=-1)
 
 
+def energy(mechanics, z, p):
+    """L without the multipliers' part, and shortenings at the nodes of every element."""
+    given, y = mechanics.jets(z, p)
+    model, m = mechanics.model, mechanics.constraints
+    q, _, square = normalise(given)
+    strain = mechanics.element_strains(q)[2]
+    pull = mechanics.section_forces(q, y)[1]
+    short = 1.0 - mechanics.stretches(pull, y)[0, ..., 0]
+    bending = np.einsum("pls,seik->pleik", y, model.moment)
+    density = 0.5 * ((mechanics.section_moments(strain, y) - bending) * strain).sum(axis=-1)
+    density = density + pull[..., 0]
+    pull[..., 0] += np.einsum("pls,sei->plei", y, model.tension)
+    density = density - 0.5 * (model.softness * pull**2).sum(axis=-1)
+    total = np.einsum("ei,lei->l", mechanics.weights, density[0])
+    total = total + 0.5 * np.einsum("ls,st,lt->l", y[0], model.quadratic, y[0])
+    total = total - (y[0][:, :m] * mechanics.by_scalars(q, y)[0][:, :m]).sum(axis=1)
+    excess = square[0][:, model.unknown_nodes] - 1.0
+    return total + 0.125 * (excess**2 @ mechanics.stiff_lengths), short.reshape(len(z), -1)
+
+
 def nodal_fields(mechanics, z, p):
     """Places and strains at the nodes of every element: M' = r' × f from its left end."""
     model, mesh = mechanics.model, mechanics.mesh

@@ -422,6 +422,41 @@ def test_searches_find_each_orbit_twice(pinned):
     np.testing.assert_allclose(energies[::2], energies[1::2], atol=1e-10)
 
 
+@pytest.mark.parametrize("soft", [{}, {"axial": 5.0, "shear": 3.0}])
+def test_the_kernel_of_the_condition_equals_jets(soft):
+    """Value and gradient of the phase condition at random states; tolerance: round-off."""
+    mechanics, generator = (
+        em.SpatialRod(**ROUND, **soft, phase=True).mechanics,
+        np.random.default_rng(5),
+    )
+    p = 0.3 * generator.normal(size=(11, mechanics.parameters))
+    z = mechanics.sample(p, generator) + 0.05 * generator.normal(size=(11, mechanics.size))
+    along = np.zeros_like(z)
+    along[:, -1] = 1.0
+    residual, wanted = mechanics.equations(z, p, (along, np.zeros_like(p)), mixed=False)
+    gradient, value = mechanics._condition(z, p, np.zeros(11, bool))
+    np.testing.assert_allclose(gradient, wanted, atol=1e-14)
+    np.testing.assert_allclose(value, residual[:, -1], atol=1e-13)
+
+
+def test_states_of_one_orbit_are_one_piece_of_the_graph_of_minima(pinned):
+    """They differ by a turn for nothing: no saddle need be searched between them."""
+    at = {"twist_B": 0.0, "twist_A": 0.0, "nu": 0.8}
+    found = em.find_equilibria(pinned, at, within=[pinned.max_curvature <= 5], starts=12, runs=2)
+    graph = found.arguments[1]
+    assert (graph.name, graph.standing) == ("graph of minima", "holds")
+    assert graph.detail.startswith("2 minima in one piece")
+
+
+def test_orbits_between_opposite_states_are_found(pinned):
+    """Three of index 2, which are the same with 23 elements; random starts meet hardly any."""
+    at = {"twist_B": 1.0, "twist_A": 0.0, "nu": 0.8}
+    found = em.find_equilibria(pinned, at, within=[pinned.max_curvature <= 10])
+    assert np.bincount(found.index).tolist() == [6, 0, 6]
+    energies = [0.43495, 1.61543, 2.02327]
+    np.testing.assert_allclose(found.energy[found.index == 2][::2], energies, rtol=1e-5)
+
+
 def test_only_what_keeps_an_orbit_has_derivatives():
     """By neighbours that are lifted: the distance from the axis, which does not turn."""
     loads = {"w": em.PointForce(0.5, (0.0, 0.0, 1.0)), "x": em.PointForce(0.6, (1.0, 0.0, 0.0))}

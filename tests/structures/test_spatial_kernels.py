@@ -5,7 +5,7 @@ import pytest
 
 import equimorph as em
 from equimorph.structures.equations import advance_by
-from oracles.spatial_twins import equations, largest_curvature, nodal_fields
+from oracles.spatial_twins import energy, equations, largest_curvature, nodal_fields
 
 SOFT = {
     "ends": ("clamped", "free"), "axial": 5.0, "shear": 3.0, "natural_twist": 1.0, "curvature": 2.0,
@@ -44,6 +44,14 @@ def test_derivatives_equal_those_of_plain_jets(case):
         found = mechanics.equations(z, p, *ways[:k])
         for part, wanted in zip(found, equations(mechanics, z, p, *ways[:k]), strict=True):
             close(part, wanted, 1e-14)
+
+
+def test_energies_and_shortenings_equal_plain_numpy(case):
+    """Tolerance: round-off of some hundred terms."""
+    mechanics, z, p, _ = case
+    energies, shortenings = energy(mechanics, z, p)
+    close(mechanics.energy(z, p), energies, 1e-13)
+    assert np.abs(mechanics.shortenings(z, p) - shortenings).max() <= 1e-12
 
 
 @pytest.mark.parametrize(("k", "sides"), [(0, 1), (1, 2), (2, 3)])

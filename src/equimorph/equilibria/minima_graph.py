@@ -56,6 +56,8 @@ class MinimaGraph:
         self.z, self.group = np.zeros((0, ground.structure.size)), np.zeros(0, int)
         self.index, self._left = np.zeros(0, int), np.zeros(0, bool)
         self.edges: list[Edge] = []
+        self._images: dict[tuple[int, str], int] = {}
+        self._orbits: list[Pair] = []
         self.tried: dict[int, set[Pair]] = {each: set() for each in range(len(ground.p))}
         self.add(z, group)
 
@@ -72,12 +74,20 @@ class MinimaGraph:
             [self._number(*each) for each in zip(z, group.tolist(), strict=True)], int
         )
         for number in range(before, len(self)):
-            for image in self.ground.images(self.z[[number]], int(self.group[number])):
-                self._number(image[0], int(self.group[number]))
+            self._add_images(number, int(self.group[number]))
         p = self.ground.p[self.group[before:]]
         self.index = np.append(self.index, self.ground.structure.index(self.z[before:], p))
         self._left = np.append(self._left, np.zeros(len(p), bool))
         return numbers
+
+    def _add_images(self, number: int, group: int) -> None:
+        """Images of a state; those on its orbit are joined with it as if by a saddle."""
+        z, p = self.z[[number]], self.ground.p[[group]]
+        for symmetry in self.ground.symmetries(group):
+            image = self._number(symmetry.apply(z, p)[0][0], group)
+            self._images[number, symmetry.name] = image
+            if symmetry.along_orbits and image != number:
+                self._orbits.append((number, image))
 
     def _number(self, z: Float[np.ndarray, " size"], group: int) -> int:
         own = np.flatnonzero(self.group == group)
@@ -117,7 +127,7 @@ class MinimaGraph:
     def pieces(self, group: int) -> tuple[Numbers, Numbers]:
         """Stable states over a point, and the number of the piece of the graph of each."""
         joined = [(edge.saddle, edge.end) for edge in self.edges if edge.end != NONE]
-        label = components(len(self), np.array(joined, int).reshape(-1, 2))
+        label = components(len(self), np.array(joined + self._orbits, int).reshape(-1, 2))
         minima = np.flatnonzero((self.group == group) & (self.index == 0))
         return minima, np.unique(label[minima], return_inverse=True)[1]
 
@@ -129,18 +139,33 @@ class MinimaGraph:
         """
         while True:
             pairs = [
-                (group, *pair) for group in range(len(self.ground.p)) for pair in self._gaps(group)
+                (group, *pair)
+                for group in range(len(self.ground.p))
+                for pair in (*self._gaps(group), *self._opposite(group))
             ]
             if not pairs:
                 return
             group, start, goal = np.array(pairs, int).T
             for each, *pair in pairs:
-                self.tried[each].add((min(pair), max(pair)))
+                self._note(each, *pair)
             given = Pairs(self.z[start], self.z[goal], self.ground.p[group])
             met = states_between(self.ground.structure, given)
             good = self.ground.structure.resolved(met.z, given.p[met.pair])
             self.add(met.z[good], group[met.pair[good]])
             self.descend()
+
+    def _note(self, group: int, start: int, goal: int) -> None:
+        """Note that a pair is tried, and with it its images, between which images are met."""
+        pairs = [(start, goal)]
+        for symmetry in self.ground.symmetries(group):
+            pairs += [(self._images[start, symmetry.name], self._images[goal, symmetry.name])]
+        self.tried[group] |= {(min(pair), max(pair)) for pair in pairs}
+
+    def _opposite(self, group: int) -> list[Pair]:
+        """Pairs of minima of one orbit, not tried: other orbits lie between them."""
+        tried, own = self.tried[group], (self.group == group) & (self.index == 0)
+        pairs = {(min(pair), max(pair)) for pair in self._orbits if own[pair[0]]}
+        return sorted(pairs - tried)
 
     def _gaps(self, group: int) -> list[Pair]:
         """Pairs of minima of different pieces that are tried next."""

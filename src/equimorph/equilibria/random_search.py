@@ -13,6 +13,7 @@ from equimorph.equilibria.trace import trace
 from equimorph.equilibria.trace_options import EventCode, TraceOptions
 from equimorph.model import Constraint, worst_relative_excess
 from equimorph.structures import Structure
+from equimorph.structures.contract import Symmetry
 from equimorph.tolerances import SAME_STATE
 
 Groups = Numbers
@@ -66,15 +67,15 @@ class Ground:
         """Largest violation in units of its bound."""
         return worst_relative_excess(self.within, z, self.p[group])
 
+    def symmetries(self, group: int) -> list[Symmetry]:
+        """Symmetries that leave the group's point unchanged."""
+        point, every = self.p[group], self.structure.symmetries()
+        return [each for each in every if np.array_equal(each.image(point), point)]
+
     def images(self, z: Lanes, group: int) -> list[Lanes]:
-        """Images of states under the symmetries that leave the group's point unchanged."""
-        vector = self.p[group]
-        p = np.tile(vector, (len(z), 1))
-        return [
-            symmetry.apply(z, p)[0]
-            for symmetry in self.structure.symmetries()
-            if np.array_equal(symmetry.image(vector), vector)
-        ]
+        """Images of states under these symmetries."""
+        p = np.tile(self.p[group], (len(z), 1))
+        return [symmetry.apply(z, p)[0] for symmetry in self.symmetries(group)]
 
 
 class Pools:

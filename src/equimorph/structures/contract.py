@@ -71,6 +71,8 @@ class Symmetry:
     """Sign of each parameter of the image: −1 where it is reversed."""
     order: Int[np.ndarray, " parameters"] | None = None
     """Number of the parameter from which each one comes; None: all keep their place."""
+    along_orbits: bool = False
+    """Whether states are led to their images by turns along which the energy stays the same."""
 
     def image(
         self, p: Float[np.ndarray, "*lanes parameters"]

@@ -119,12 +119,6 @@ class SpatialLagrangian(RodMechanics):
         """Whether the axis stretches."""
         return bool(self.model.softness[..., 0].any())
 
-    def shortenings(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes points"]:
-        """Elastic shortenings of the axis at the nodes of every element."""
-        q, y = self.rotations(z, p)[None], self.scalars(z, p)[None]
-        stretch = self.stretches(self.section_forces(q, y)[1], y)[0, ..., 0]
-        return np.asarray(1.0 - stretch.reshape(len(z), self.model.softness[..., 0].size))
-
     def section_moments(self, strain: Jet, y: Jet) -> Jet:
         """Moments on the axes of the cross-section."""
         out = self.model.stiffness * strain
@@ -169,26 +163,6 @@ class SpatialLagrangian(RodMechanics):
         return np.asarray(out + np.einsum("pls,st->plt", y, model.quadratic))
 
     # --- contract -------------------------------------------------------------------------------
-
-    def energy(self, z: Lanes, p: Parameters) -> Values:
-        """L without the multipliers' part."""
-        given, y = self.jets(z, p)
-        m = self.constraints
-        q, _, square = normalise(given)
-        _, _, strain = self.element_strains(q)
-        _, axial = self.section_forces(q, y)
-        bending = np.einsum("pls,seik->pleik", y, self.model.moment)
-        moment = self.section_moments(strain, y)
-        density = 0.5 * ((moment - bending) * strain).sum(axis=-1)
-        density = density + axial[..., 0]
-        pull = axial.copy()
-        pull[..., 0] += np.einsum("pls,sei->plei", y, self.model.tension)
-        density = density - 0.5 * (self.model.softness * pull**2).sum(axis=-1)
-        total = np.einsum("ei,lei->l", self.weights, density[0])
-        total = total + 0.5 * np.einsum("ls,st,lt->l", y[0], self.model.quadratic, y[0])
-        total = total - (y[0][:, :m] * self.by_scalars(q, y)[0][:, :m]).sum(axis=1)
-        excess = square[0][:, self.model.unknown_nodes] - 1.0
-        return np.asarray(total + 0.125 * (excess**2 @ self.stiff_lengths))
 
     def effort(self, z: Lanes, p: Parameters) -> Parameters:
         """∂L/∂p."""
@@ -291,13 +265,14 @@ class SpatialLagrangian(RodMechanics):
         return symmetries(self.model, self.unknowns)
 
 
+HALF_TURN = "half turn about x"
 CANDIDATES = (
     Reflection("mirror", np.array([-1.0, 1.0, 1.0])),
     Reflection("sideways mirror", np.array([1.0, 1.0, -1.0])),
     Reflection("half turn about y", np.array([-1.0, 1.0, -1.0])),
     Reflection("reflection", np.array([1.0, -1.0, 1.0])),
     Reflection("half turn about z", np.array([-1.0, -1.0, 1.0])),
-    Reflection("half turn about x", np.array([1.0, -1.0, -1.0])),
+    Reflection(HALF_TURN, np.array([1.0, -1.0, -1.0])),
     Reflection("inversion", np.array([-1.0, -1.0, -1.0])),
 )
 

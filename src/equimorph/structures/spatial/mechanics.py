@@ -19,6 +19,7 @@ from equimorph.structures.equations import (
     Solver,
 )
 from equimorph.structures.spatial.derivative_kernels import equations_lanes
+from equimorph.structures.spatial.energy_kernels import energies_lanes
 from equimorph.structures.spatial.lagrangian import LENGTH_STIFFNESS, SpatialLagrangian
 from equimorph.structures.spatial.model import SpatialModel
 from equimorph.structures.spatial.quaternions import PAIRS, Jet
@@ -64,9 +65,17 @@ def equation_tables(
 
     `lengths` are those of `step_tables`.
     """
+    *tables, quadratic = energy_tables(model, lengths)
+    return *tables, quadratic[: model.multipliers]
+
+
+def energy_tables(
+    model: SpatialModel, lengths: Float[np.ndarray, " unknown"]
+) -> tuple[np.ndarray, ...]:
+    """What `energy_kernels.energies_lanes` shares among lanes, after the pairs of its jets."""
     whole = np.ones(len(model.mesh.nodes))
     whole[model.unknown_nodes] = lengths
-    return *field_tables(model), whole, np.ascontiguousarray(model.quadratic[: model.multipliers])
+    return *field_tables(model), whole, np.ascontiguousarray(model.quadratic)
 
 
 def field_tables(model: SpatialModel) -> tuple[np.ndarray, ...]:
@@ -200,6 +209,26 @@ class SpatialMechanics(SpatialLagrangian, JointEquations):
         del p
         return np.zeros_like(z)
 
+    # --- energy ---------------------------------------------------------------------------------
+
+    def energy(self, z: Lanes, p: Parameters) -> Values:
+        """L without the multipliers' part."""
+        return self._energies(z, p)[0]
+
+    def shortenings(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes points"]:
+        """Elastic shortenings of the axis at the nodes of every element."""
+        return self._energies(z, p)[1]
+
+    def _energies(
+        self, z: Lanes, p: Parameters
+    ) -> tuple[Values, Float[np.ndarray, "lanes points"]]:
+        self.check_widths((z, p))
+        energies, shortenings = np.empty(len(z)), np.empty((len(z), self.weights.size))
+        inputs = [np.ascontiguousarray(z), np.ascontiguousarray(p)]
+        shared = pairs_of(1)[0], *self._energy_tables
+        over_lanes(energies_lanes, shared, inputs, [energies, shortenings])
+        return energies, shortenings
+
     # --- solves ---------------------------------------------------------------------------------
 
     def solve(
@@ -274,6 +303,10 @@ class SpatialMechanics(SpatialLagrangian, JointEquations):
     @cached_property
     def _equation_tables(self) -> tuple[np.ndarray, ...]:
         return equation_tables(self.model, 0.5 * self.stiff_lengths)
+
+    @cached_property
+    def _energy_tables(self) -> tuple[np.ndarray, ...]:
+        return energy_tables(self.model, 0.5 * self.stiff_lengths)
 
     @cached_property
     def step_tables(self) -> tuple[np.ndarray, ...]:

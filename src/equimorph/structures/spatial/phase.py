@@ -24,13 +24,17 @@ import numpy as np
 from equimorph.arrays import Flags, Float, Lanes, Parameters, Sides, Values
 from equimorph.linalg import BorderedSolution
 from equimorph.linalg.dense import multiply, no_border
+from equimorph.linalg.lanes import over_lanes
+from equimorph.structures.contract import Symmetry
 from equimorph.structures.equations import Advance, AnyBorder, Direction, Shift
-from equimorph.structures.spatial.mechanics import SpatialMechanics
+from equimorph.structures.spatial.lagrangian import HALF_TURN
+from equimorph.structures.spatial.mechanics import SpatialMechanics, field_tables, pairs_of
 from equimorph.structures.spatial.phase_condition import (
     breaking_scalars,
     phase_weight,
     with_phase_condition,
 )
+from equimorph.structures.spatial.phase_kernels import condition_lanes
 from equimorph.structures.spatial.quaternions import Jet
 from equimorph.structures.spatial.step_kernels import advance_lanes
 
@@ -50,8 +54,8 @@ class PinnedMechanics(SpatialMechanics):
 
     def on_axis(self, z: Lanes) -> Flags:
         """Whether states are those that the turn leaves as they are: ξ = (0, 0, −q₃, q₂)."""
-        across = slice(2, self.unknowns, 4), slice(3, self.unknowns, 4)
-        square = sum(z[:, each] ** 2 @ self.mass[each] for each in across)
+        q, n = z[:, : self.unknowns].reshape(len(z), self.unknowns // 4, 4), self.unknowns
+        square = np.einsum("lna,lna,n->l", q[..., 2:], q[..., 2:], self.mass[2:n:4])
         return np.asarray(square < ON_AXIS**2)
 
     def equations(self, z: Lanes, p: Parameters, *directions: Direction, mixed: bool = True) -> Jet:
@@ -78,13 +82,14 @@ class PinnedMechanics(SpatialMechanics):
         cross-section about the axis, with which F_z of the rod itself is regular. On the axis a
         border, as is given to nearly singular matrices, lets the condition hold one of a pair.
         """
-        own, below = self.equations(z, p, self._along(z, p))[1], np.zeros(len(z), bool)
-        void = np.flatnonzero(self.on_axis(z)) if border is not None else np.zeros(0, int)
+        on_axis, below = self.on_axis(z), np.zeros(len(z), bool)
+        own = self._condition(z, p, on_axis)[0]
+        void = np.flatnonzero(on_axis) if border is not None else np.zeros(0, int)
         if len(void):
             shifts = None if shift is None else shift[void]
             own[void], below[void] = self._hold_pairs(z[void], p[void], shifts)
         around = no_border(len(z), self.size) if border is None else border
-        springs, turn = self._springs(z)
+        springs, turn = self._springs(z, on_axis)
         columns, rows = (
             np.concatenate([own[:, None, :-1], turn[:, None], each[..., :-1]], axis=1)
             for each in around[:2]
@@ -93,7 +98,7 @@ class PinnedMechanics(SpatialMechanics):
         corner = np.zeros((len(z), k, k))
         corner[:, 0, 0], corner[:, 1, 1], corner[:, 2:, 2:] = own[:, -1], 1.0, around[2]
         corner[:, 0, 2:], corner[:, 2:, 0] = around[0][..., -1], around[1][..., -1]
-        mu = np.where(self.on_axis(z), 0.0, z[:, -1])
+        mu = np.where(on_axis, 0.0, z[:, -1])
         found = self.bare.eliminate(
             z[:, :-1],
             np.concatenate([mu[:, None], p], axis=1),
@@ -115,7 +120,7 @@ class PinnedMechanics(SpatialMechanics):
         """
         n, lanes = self.unknowns, len(z)
         bare = np.concatenate([z[:, :-1], np.zeros((lanes, 1))], axis=1)
-        side = super().equations(bare, p, self._along(z, p))[1]
+        side = self._condition(bare, p, np.zeros(lanes, bool))[0]
         given = np.zeros(lanes) if shift is None else shift
         mode, value = side[:, :n] / self.mass, np.zeros(lanes)
         for number in range(INVERSE + RAYLEIGH):
@@ -130,11 +135,24 @@ class PinnedMechanics(SpatialMechanics):
         side[:, :n] = self.mass * mode
         return side, np.asarray(value < 0.0)
 
-    def _along(self, z: Lanes, p: Parameters) -> Direction:
-        """The direction of μ."""
-        along = np.zeros_like(z)
-        along[:, -1] = 1.0
-        return along, np.zeros_like(p)
+    def _condition(self, z: Lanes, p: Parameters, void: Flags) -> tuple[Lanes, Values]:
+        """∂F/∂μ, which is the gradient of the condition, and the condition's row of F."""
+        gradients, values = np.empty(z.shape), np.empty(len(z))
+        inputs = [np.ascontiguousarray(z), np.ascontiguousarray(p)]
+        shared = pairs_of(1)[0], *self._condition_tables
+        over_lanes(condition_lanes, shared, inputs, [gradients, values])
+        gradients[void], values[void] = 0.0, -z[void, -1]
+        gradients[void, -1] = -1.0
+        return gradients, values
+
+    @cached_property
+    def _condition_tables(self) -> tuple[np.ndarray, ...]:
+        """What `phase_kernels.condition_lanes` shares among lanes, after the pairs of its jets."""
+        _, weights, *_, forces, picks, tension, tied, softness, turned, held = field_tables(
+            self.model
+        )
+        quadratic = np.ascontiguousarray(self.model.quadratic)
+        return weights, forces, picks, tension, tied, softness, turned, held, quadratic
 
     @cached_property
     def bare(self) -> SpatialMechanics:
@@ -143,7 +161,7 @@ class PinnedMechanics(SpatialMechanics):
         return SpatialMechanics(replace(self.model, multipliers=m, names=names))
 
     def _springs(
-        self, z: Lanes
+        self, z: Lanes, void: Flags
     ) -> tuple[Float[np.ndarray, "lanes 4"], Float[np.ndarray, "lanes bare"]]:
         """Springs of `solve_bordered_lanes`, and w·φ_v by the unknowns without μ.
 
@@ -158,7 +176,7 @@ class PinnedMechanics(SpatialMechanics):
         a, b, c, d = q[lanes, node].T
         size, across = np.sqrt(a * a + b * b + c * c + d * d), np.sqrt(c * c + d * d)
         root = np.sqrt(self.model.stiffness.max() * self.mesh.elements)
-        root = np.where(self.on_axis(z), 0.0, root)
+        root = np.where(void, 0.0, root)
         by = root / (size * np.maximum(across, ON_AXIS**2))
         springs[:, 0] = (node + start) // degree
         springs[:, 1], springs[:, 2] = -by * across**2, by * (b * c - a * d)
@@ -178,11 +196,13 @@ class PinnedMechanics(SpatialMechanics):
         of first order in F, so that steps converge as quickly.
         """
         z, p, row, dp = self.check_widths((z, p), (row, dp))
-        residual, own = self.equations(z, p, self._along(z, p), mixed=False)
-        springs, around, none = self._springs(z)[0], self.velocity(z), np.zeros((len(z), 1))
+        void, bare, none = self.on_axis(z), z.copy(), np.zeros((len(z), 1))
+        bare[:, -1] = 0.0
+        own, gap = self._condition(bare, p, void)
+        springs, around = self._springs(z, void)[0], self.velocity(z)
         rate = _dot(own, around)
         by = np.divide(1.0, rate, out=np.zeros(len(z)), where=rate != 0.0)
-        gap, lean = residual[:, -1] - own[:, -1] * z[:, -1], by * _dot(row, around)
+        lean = by * _dot(row, around)
         given = (
             z, np.concatenate([none, p], axis=1), np.concatenate([none, dp], axis=1),
             row - lean[:, None] * own, corner, defect - lean * gap - row[:, -1] * z[:, -1], springs,
@@ -192,12 +212,12 @@ class PinnedMechanics(SpatialMechanics):
             way[:, -1] = 0.0
             np.subtract(way, (by * (_dot(own, way) + off))[:, None] * around, out=way)
         step.dz[:, -1] -= z[:, -1]
-        step.residual[:] = np.abs(residual).max(axis=1)
+        force = np.abs(z[:, -1]) * np.abs(own).max(axis=1)
+        np.maximum(step.residual, np.maximum(np.abs(gap), force), out=step.residual)
         scale = np.divide(rate, 2.0 * springs[:, 1], out=np.ones(len(z)), where=rate != 0.0)
         with np.errstate(over="ignore"):  # of rods with many elements
             step.determinant[:] *= -(scale**2)
         step = self.pivot_steps(step, ratio, z, p, dp, row, corner, defect)
-        void = self.on_axis(z)
         pairs = 1.0 - 2.0 * (step.index[void] // 2 % 2)
         step.determinant[void] = pairs * np.sqrt(np.abs(step.determinant[void]))
         return step
@@ -222,6 +242,11 @@ class PinnedMechanics(SpatialMechanics):
     def may_resolve(self, z: Lanes, p: Parameters) -> Flags:
         """Whether rotations jump nowhere, and the phase condition exerts no force."""
         return np.asarray(super().may_resolve(z, p) & (np.abs(z[:, -1]) < NO_FORCE))
+
+    def symmetries(self) -> tuple[Symmetry, ...]:
+        """Those of the rod; the half turn about the axis leads along orbits."""
+        every = super().symmetries()
+        return tuple(replace(each, along_orbits=each.name == HALF_TURN) for each in every)
 
     def turn(self, z: Lanes, angle: Values) -> Lanes:
         """States turned about the axis by angles, with the forces of the supports."""
