@@ -96,8 +96,14 @@ def events_at(bracket: Bracket, code: EventCode, place: Located) -> Events:
 def _join(brackets: list[Bracket], bit: int) -> Bracket | None:
     """All brackets in which `bit` happened, as one."""
     chosen = [(bracket, np.flatnonzero(bracket.what & bit)) for bracket in brackets]
-    parts = [bracket.take(at) for bracket, at in chosen if len(at)]
-    return Bracket.concatenate(parts) if parts else None
+    parts = [
+        bracket if len(at) == len(bracket.what) else bracket.take(at)
+        for bracket, at in chosen
+        if len(at)
+    ]
+    if len(parts) < 2:
+        return parts[0] if parts else None
+    return Bracket.concatenate(parts)
 
 
 def _locate(
