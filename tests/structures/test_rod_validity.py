@@ -103,6 +103,22 @@ def test_clearances_are_those_of_dense_samples():
         assert rod.clearance(0.25)(state) == pytest.approx(exact, abs=1e-5)
 
 
+def test_the_clearance_of_a_sheared_rod_is_that_of_dense_samples():
+    """Shear of 30 %; 3e-4: samples 1/4000 apart that must differ by `apart`. It was off by 1.3e-3."""
+    load = {"P": em.PointForce(1.0, (-1.0, -0.5, 0.6))}
+    soft = {"axial": 30.0, "shear": 1.0, "torsion": 0.8, "lateral": 1.0}
+    rod = em.SpatialRod(ends=("clamped", "free"), curvature=8.0, loads=load, **soft)
+    state = em.lift(rod.natural_state(), {"P": 0.4}).end.state
+    places = rod.shape(state.z[None], state.p[None], np.linspace(0.0, 1.0, 4001))[0]
+    for steps in (1200, 2000, 2800):
+        rows = places[: 4001 - steps]
+        least = min(
+            np.linalg.norm(places[k + steps :: 4] - row, axis=1).min()
+            for k, row in zip(range(0, len(rows), 4), rows[::4], strict=True)
+        )
+        assert rod.clearance(steps / 4000)(state) == pytest.approx(least, abs=3e-4)
+
+
 def test_distances_of_a_stretched_rod_are_those_of_dense_samples():
     """Strains of 20 % in the plane, shear in space; 1e-6: that of samples 1/20000 apart."""
     ends = ("clamped", "free")

@@ -14,7 +14,6 @@ from equimorph.errors import InputError
 from equimorph.linalg import BorderedSolution
 from equimorph.linalg.intervals import Interval
 from equimorph.model import Constraint, Descriptor, remember_call
-from equimorph.model.obstacle import smooth_arcs
 from equimorph.structures.contract import Readers, Symmetry, Written
 from equimorph.structures.equations import (
     Advance,
@@ -26,7 +25,7 @@ from equimorph.structures.equations import (
     Shift,
 )
 from equimorph.structures.resolution import Refinable
-from equimorph.structures.rod.centreline import Centreline, closest_approach, stations, stretches
+from equimorph.structures.rod.centreline import Centreline, arcs_through, closest_approach
 from equimorph.structures.rod.discretisation import Mesh
 from equimorph.structures.rod.inertia import HeavyRod
 from equimorph.structures.rod.mechanics import RodMechanics
@@ -37,10 +36,6 @@ from equimorph.structures.rod.units import Units
 from equimorph.structures.states import State, States
 from equimorph.structures.unit_system import Quantity, Units as SystemSpec, unit_system
 
-ARCS = 128
-"""Number of cubic arcs along a rod: their error is below 1e-10 for κ = 10."""
-NEXT = 1e-4
-"""Arclength to neighbouring places whose differences are the derivatives of places."""
 ENDLESS = 20.0
 """Curvature, times the length, that is proposed as the bound of a set."""
 BOUNDING = {*((f"max_{name}", "<=") for name in ("curvature", "strain", "stress")),
@@ -240,7 +235,7 @@ class AnyRod(HeavyRod, Refinable):
 
     @abstractmethod
     def centreline(self, z: Lanes, p: Parameters, s: Arclengths) -> Centreline:
-        """Places, tangents, normals and curvature at arclengths."""
+        """Places, tangents and normals at arclengths."""
 
     @abstractmethod
     def largest_curvature(self, z: Lanes, p: Parameters) -> tuple[Values, Values]:
@@ -253,19 +248,8 @@ class AnyRod(HeavyRod, Refinable):
         return self.places(z, p, arclengths(s))
 
     def arcs(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes arcs 4 axes"]:
-        """Shape as cubic arcs with the rod's positions and their derivatives at their ends.
-
-        Those are of the parabola through three places beside the end, which know stretch and shear.
-        All three lie on one side, as fields that are no equilibrium may jump where elements meet.
-        """
-        s = np.linspace(0.0, 1.0, ARCS + 1)
-        side = np.where(s < 0.5, NEXT, -NEXT)
-        points = s + np.array([[0.5], [1.5], [2.5]]) * side
-        near, middle, far = np.split(self.places(z, p, points.ravel()), 3, axis=1)
-        bend = far - 2.0 * middle + near
-        slope = middle - near - bend
-        rate = slope / side[:, None]
-        return smooth_arcs(near - 0.5 * slope - 0.125 * bend, rate, 1.0 / ARCS)
+        """Shape as cubic arcs with the rod's positions and their derivatives at their ends."""
+        return arcs_through(lambda s: self.places(z, p, s))
 
     # --- natural states -------------------------------------------------------------------------
 
@@ -389,8 +373,7 @@ class AnyRod(HeavyRod, Refinable):
             )
 
         def found(z: Lanes, p: Parameters) -> tuple[Values, Values]:
-            line, short = self.centreline(z, p, stations()), self.shortenings(z, p)
-            return closest_approach(line, stretches(short, self.mesh), apart)
+            return closest_approach(lambda s: self.places(z, p, s), apart)
 
         def value(z: Lanes, p: Parameters) -> Values:
             return found(z, p)[0]

@@ -95,12 +95,12 @@ class Measured(StressedRod):
         return self.fields(z, p, s)[:, :, 2:]
 
     def centreline(self, z: Lanes, p: Parameters, s: Arclengths) -> Centreline:
-        """Places, tangents, normals to the left and curvature at arclengths."""
-        fields, length = self.fields(z, p, s), self.units.value("length")
-        angles, bending = fields[:, :, 0], length * fields[:, :, 1, None]
+        """Places, tangents, and normals to the left at arclengths."""
+        fields = self.fields(z, p, s)
+        angles = fields[:, :, 0]
         tangents = np.stack([np.cos(angles), np.sin(angles)], axis=2)
         left = np.stack([-tangents[:, :, 1], tangents[:, :, 0]], axis=2)
-        return Centreline(fields[:, :, 2:], tangents, left[:, :, None], bending * left, length)
+        return Centreline(fields[:, :, 2:], tangents, left[:, :, None])
 
     @property
     def sprung_in_lengths(self) -> MaterialPoints | None:

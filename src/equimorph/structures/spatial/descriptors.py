@@ -65,12 +65,10 @@ class DescribedInSpace(StressedRod):
         return self.fields(z, p, s).places
 
     def centreline(self, z: Lanes, p: Parameters, s: Arclengths) -> Centreline:
-        """Places, tangents, normals n and b, and curvature at arclengths."""
-        fields, length = self.fields(z, p, s), self.units.value("length")
+        """Places, tangents, and normals n and b at arclengths."""
+        fields = self.fields(z, p, s)
         tangents, n, b = np.moveaxis(fields.frames, -1, 0)
-        strains = length * fields.strains
-        bends = n * strains[..., 2:3] - b * strains[..., 1:2]
-        return Centreline(fields.places, tangents, np.stack([n, b], axis=2), bends, length)
+        return Centreline(fields.places, tangents, np.stack([n, b], axis=2))
 
     def largest_curvature(self, z: Lanes, p: Parameters) -> tuple[Values, Values]:
         """Largest bending curvature along the rod, and the arclength where it occurs."""
