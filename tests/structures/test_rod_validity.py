@@ -104,7 +104,7 @@ def test_clearances_are_those_of_dense_samples():
 
 
 def test_the_clearance_of_a_sheared_rod_is_that_of_dense_samples():
-    """Shear of 30 %; 3e-4: samples 1/4000 apart that must differ by `apart`. It was off by 1.3e-3."""
+    """Shear of 30 %; 3e-4: samples 1/4000 apart that differ by `apart`. It was off by 1.3e-3."""
     load = {"P": em.PointForce(1.0, (-1.0, -0.5, 0.6))}
     soft = {"axial": 30.0, "shear": 1.0, "torsion": 0.8, "lateral": 1.0}
     rod = em.SpatialRod(ends=("clamped", "free"), curvature=8.0, loads=load, **soft)
