@@ -8,8 +8,11 @@ independently by two or three methods to the digits given.
 import numpy as np
 import pytest
 
+from equimorph.charts.coordinates import frames_anywhere
 from equimorph.equilibria import find_equilibria
+from equimorph.manifold import VertexKind
 from equimorph.manifold.geometry.kernels import match_or_add
+from equimorph.manifold.geometry.tangents import bend_along, frames_in_embedding, split_step
 from oracles.complexes import assert_faithful, assert_folds_are_singular
 
 
@@ -167,3 +170,19 @@ def test_match_or_add_equals_its_plain_twin():
         if not same:
             known.append((vertex, point))
     assert count == len(known)
+
+
+@pytest.mark.parametrize("fold", [False, True])
+def test_sets_bend_as_their_second_derivative_says(arch_set, fold):
+    """The residual at z + h t + h² b/2 is of third order in h: an eighth for half of it."""
+    some = np.flatnonzero((arch_set.kinds == VertexKind.FOLD) == fold)[::9]
+    at, setting = arch_set.points[some], arch_set.setting
+    frames = frames_anywhere(setting, at.z, at.p)
+    rows = frames_in_embedding(setting, frames)
+    step = np.einsum("k,lkf->lf", [0.8, 0.6], frames)
+    bend = bend_along(setting, at.z, at.p, rows, step)
+    sizes = []
+    for h in (2e-2, 1e-2):
+        dz, dp = split_step(setting, h * step + 0.5 * h**2 * bend)
+        sizes.append(np.abs(at.structure.residual(at.z + dz, at.p + dp)).max())
+    assert 7.0 < sizes[0] / sizes[1] < 9.0

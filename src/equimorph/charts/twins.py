@@ -1,17 +1,17 @@
 """Second states beside given ones with the same coordinates, where these nearly fold.
 
 Along the direction v in which the coordinates change least, their component along u follows
-``σ t + c t²/2``, which vanishes again at ``t = −2σ/c``. The curvature c comes from states of the
-set on both sides along v, so that no singular state has to be known.
+``σ t + c t²/2``, which vanishes again at ``t = −2σ/c``. The curvature c comes from points on both
+sides along v, on the set to second order, so that no singular state has to be known.
 """
 
 import numpy as np
 
 from equimorph.arrays import Float, Items, Lanes, Parameters, Points, Rows
-from equimorph.charts.coordinates import Coordinates, settle_on_set, solve_on_the_set
+from equimorph.charts.coordinates import Coordinates, solve_on_the_set
 from equimorph.charts.location import Cells, Found
 from equimorph.charts.singular_pairs import unite
-from equimorph.manifold.geometry.tangents import split_step, tangent_frames
+from equimorph.manifold.geometry.tangents import bend_along, split_step, tangent_frames
 from equimorph.structures import States
 
 STEP = 0.02
@@ -53,13 +53,13 @@ def _guesses(
     left, sizes, right = np.linalg.svd(slopes)
     steps = np.einsum("lk,lkf->lf", right[:, -1], frames)
     dz, dp = split_step(setting, steps)
+    bent = split_step(setting, bend_along(setting, z, p, rows, steps))
     # both sides at once: single states cost calls, not arithmetic
-    beside_z, beside_p = (
-        np.concatenate([each - STEP * d, each + STEP * d]) for each, d in ((z, dz), (p, dp))
+    every = (
+        np.concatenate([here, here - STEP * d + half, here + STEP * d + half])
+        for here, d, half in ((z, dz, 0.5 * STEP**2 * bent[0]), (p, dp, 0.5 * STEP**2 * bent[1]))
     )
-    there = settle_on_set(setting, beside_z, beside_p, np.concatenate([rows, rows]))
-    every = np.concatenate([there.z, z]), np.concatenate([there.p, p])
-    below, above, here = np.split(coordinates(*every) / ranges, 3)
+    here, below, above = np.split(coordinates(*every) / ranges, 3)
     second = (below - 2.0 * here + above) / STEP**2
     bend = np.einsum("lm,lm->l", left[:, :, -1], second)
     with np.errstate(divide="ignore", invalid="ignore"):

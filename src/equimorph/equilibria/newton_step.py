@@ -235,16 +235,19 @@ class Points(Columns):
     def _over_parameters(self) -> Tangent:
         """The same where parameters are the coordinates: the structure's fused steps."""
         (lanes, size), k = self.z.shape, self.problem.width
-        still, one, none = np.zeros((lanes, size)), np.ones(lanes), np.zeros(lanes)
-        along, fixed = np.zeros((lanes, k, size + k)), np.zeros_like(self.p)
-        for i in range(max(k, 1)):
-            dp = np.ascontiguousarray(self.problem.directions[:, i]) if k else fixed
-            move = self.problem.structure.advance(self.z, self.p, dp, still, one, none)
-            along[:, i : i + 1, :size] = move.tangent_z[:, None]
-        onto = move.dz
+        rounds = max(k, 1)  # one call for all directions: calls cost more than lanes
+        still, many = np.zeros((rounds * lanes, size)), rounds * lanes
+        z, p = (np.concatenate([each] * rounds) for each in (self.z, self.p))
+        dp = (
+            np.concatenate([*self.problem.directions.transpose(1, 0, 2)]) if k else np.zeros_like(p)
+        )
+        move = self.problem.structure.advance(z, p, dp, still, np.ones(many), np.zeros(many))
+        along, onto = np.zeros((lanes, k, size + k)), np.zeros((lanes, size + k))
+        onto[:, :size] = move.dz[:lanes]
         if k:
-            onto, along[:, :, size:] = np.concatenate([onto, fixed[:, :k]], axis=1), np.eye(k)
-        return Tangent(onto, along, move.index, np.ones(lanes, bool))
+            along[:, :, :size] = move.tangent_z.reshape(k, lanes, size).transpose(1, 0, 2)
+            along[:, :, size:] = np.eye(k)
+        return Tangent(onto, along, move.index[:lanes], np.ones(lanes, bool))
 
 
 def start_at(problem: Problem, z: Lanes, p: Parameters) -> Points:
@@ -303,9 +306,10 @@ def _unit(v: Lanes) -> Lanes:
 
 def free_directions(structure: Structure, free: Int[np.ndarray, "*_ k"], lanes: int) -> Directions:
     """Directions in which parameters change by their scales: the same for all lanes, or of each."""
-    places = np.broadcast_to(free, (lanes, free.shape[-1]))
-    out = np.zeros((*places.shape, len(structure.parameters)))
-    np.put_along_axis(out, places[:, :, None], structure.scales[places][:, :, None], axis=2)
+    k = free.shape[-1]
+    out = np.zeros((lanes, k, len(structure.parameters)))
+    lane = slice(None) if free.ndim == 1 else np.arange(lanes)[:, None]
+    out[lane, np.arange(k), free] = structure.scales[free]
     return out
 
 

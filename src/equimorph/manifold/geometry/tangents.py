@@ -45,16 +45,41 @@ def tangent_frames(setting: Setting, z: Lanes, p: Parameters, rows: Rows) -> Fra
     orientation the bases take over.
     """
     structure, (lanes, size), d = setting.structure, z.shape, len(setting.free)
-    frames, n = np.empty((lanes, d, size + d)), structure.unknowns
+    frames = np.empty((lanes, d, size + d))
     for at in range(0, lanes, CHUNK):
         own = slice(at, at + CHUNK)
-        some, few = rows[own], len(z[own])
-        directions = free_directions(structure, setting.free, few)
-        system = structure.linear_system(z[own], p[own], directions)
-        by_z, rhs = np.zeros((few, d, size)), np.zeros((few, d, size + d))
-        by_z[:, :, :n], rhs[:, :, size:] = some[:, :, :n] * np.sqrt(structure.mass), np.eye(d)
-        frames[own] = system.solve(rhs, (system.columns, by_z, some[:, :, n:])).x
+        rhs = np.zeros((len(z[own]), d, size + d))
+        rhs[:, :, size:] = np.eye(d)
+        frames[own] = _solve_in_planes(setting, z[own], p[own], rows[own], rhs)
     return orthonormal_rows(frames, d, weights_of(structure, size + d))
+
+
+def bend_along(
+    setting: Setting, z: Lanes, p: Parameters, rows: Rows, step: Float[np.ndarray, "lanes full"]
+) -> Float[np.ndarray, "lanes full"]:
+    """Second derivative, orthogonal to rows that span nearby spaces, of the set along tangents.
+
+    ``[F_z F_p; R] b = (−D²F[t, t], 0)``: to second order the set is at ``z + h t + h² b/2``.
+    """
+    along = split_step(setting, step)
+    rhs = np.zeros((len(z), 1, step.shape[1]))
+    rhs[:, 0, : z.shape[1]] = -setting.structure.second_derivative(z, p, along, along)
+    return _solve_in_planes(setting, z, p, rows, rhs)[:, 0]
+
+
+def _solve_in_planes(
+    setting: Setting,
+    z: Lanes,
+    p: Parameters,
+    rows: Rows,
+    rhs: Float[np.ndarray, "lanes sides full"],
+) -> Float[np.ndarray, "lanes sides full"]:
+    """Solve with F_z and F_p at points, bordered by rows of the embedding."""
+    structure, n = setting.structure, setting.structure.unknowns
+    system = structure.linear_system(z, p, free_directions(structure, setting.free, len(z)))
+    by_z = np.zeros((*rows.shape[:2], z.shape[1]))
+    by_z[:, :, :n] = rows[:, :, :n] * np.sqrt(structure.mass)
+    return system.solve(rhs, (system.columns, by_z, rows[:, :, n:])).x
 
 
 def frames_in_embedding(setting: Setting, frames: Frames) -> Rows:
