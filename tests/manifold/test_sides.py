@@ -185,6 +185,33 @@ def test_a_fold_lies_in_a_side_over_three_parameters():
     np.testing.assert_array_equal(counts, np.where(a > (b * c) ** 2, 2, 0))
 
 
+def test_a_cusp_line_leaves_through_a_side_over_three_parameters():
+    """A cubic in x, its cusps in a line across a = 0: as many states as roots, nothing bisected.
+
+    Behind the cusp in a = 0 the fold bulges beyond the side, in cells of every size.
+    """
+    with unchecked():
+        structure = Polynomial(
+            lambda x, a, b, c: integral(
+                0.0343 * x**3
+                - (b - 0.0154 * a) * x
+                - (c + 0.029 * a + 0.2193 * b)
+                - 0.0851 * a * x**2
+            ),
+            1,
+            ("a", "b", "c"),
+        )
+        box = Box(a=(0.0, 0.5), b=(-0.8, 0.9), c=LONG)
+        eset = equilibrium_set(structure, box, intervals=(2, 2, 4), checks=0)
+        p = np.random.default_rng(0).uniform(box.lower, box.upper, (200, 3))
+        counts = np.bincount(eset.over(**dict(zip("abc", p.T, strict=True))).point, minlength=200)
+    assert eset.audit.clean, eset.audit.faults
+    assert eset.audit.bisected == 0
+    for (a, b, c), count in zip(p, counts, strict=True):
+        roots = np.roots([0.0343, -0.0851 * a, -(b - 0.0154 * a), -(c + 0.029 * a + 0.2193 * b)])
+        assert count == (np.abs(roots.imag) < 1e-9).sum()
+
+
 def test_diagrams_begin_at_folds_and_crossings():
     """Over one parameter: y² = a and y³ = a y over a ≥ 0, from the singular state on."""
     for kind, sheets in (("fold", 2), ("pitchfork", 3)):

@@ -369,5 +369,28 @@ def _pin_inside(
     else:
         frames = mesh.vertices[mesh.tetrahedra[owner]]
         pinned = pin_in_cells(setting, pairing.points, groups, kind, span, frames)
-    inside = mesh.covers(pinned.p[:, setting.free])
-    return Pinned(pinned.z, pinned.p, pinned.found & inside)
+    pinned.found[:] &= mesh.covers(pinned.p[:, setting.free])
+    if kind == VertexKind.FOLD:
+        _pin_beside_sides(pairing, groups, owner, pinned)
+    return pinned
+
+
+def _pin_beside_sides(
+    pairing: Pairing, groups: Sequence[Sequence[int]], owner: Int[np.ndarray, " groups"], at: Pinned
+) -> None:
+    """Pin folds in place that were beyond a side, in the plane parallel to it through the middle.
+
+    Behind a cusp in a side folds bulge beyond it, in cells of every size.
+    """
+    setting, mesh = pairing.setting, pairing.mesh
+    for axis in range(len(setting.free)):
+        lanes = np.flatnonzero(~at.found)
+        if len(lanes) == 0:
+            return
+        own = [groups[lane] for lane in lanes.tolist()]
+        span = np.tile(np.delete(np.eye(len(setting.free)), axis, axis=0), (len(lanes), 1, 1))
+        frames = mesh.vertices[mesh.tetrahedra[owner[lanes]]]
+        held = pin_in_cells(setting, pairing.points, own, VertexKind.FOLD, span, frames)
+        good = held.found & mesh.covers(held.p[:, setting.free])
+        at.z[lanes[good]], at.p[lanes[good]] = held.z[good], held.p[good]
+        at.found[lanes[good]] = True
