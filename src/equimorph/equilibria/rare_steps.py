@@ -53,10 +53,10 @@ class RareSteps:
         for k, at in enumerate(close):
             if len(at):
                 self._refuse_grazing(k, at, move)
-        if locates and (what & (HIDDEN | EARLY) != 0).any():
-            self._look_inside(move)
         if branched is not None:
             self._note_branch_points(branched)
+        if locates and (what & (HIDDEN | EARLY) != 0).any():
+            self._look_inside(move)
 
     def _refuse_grazing(self, k: int, at: Some, move: Advance) -> None:
         """Refuse steps inside which the cubic through values and slopes may exceed the bound.
@@ -98,21 +98,30 @@ class RareSteps:
         ends = bool(self.options.stops & BRANCH)
         what[at] = what[at] & ~BRANCH | (ENDING if ends else 0)
         if len(at):
-            self.hidden.append(events.take(np.isin(events.lanes, rows.lanes[at])))
+            events = events.take(np.isin(events.lanes, rows.lanes[at]))
+            self._last.update(zip(events.lanes.tolist(), events.travelled.tolist(), strict=True))
+            self.hidden.append(events)
 
     def _look_inside(self, move: Advance) -> None:
         """Search steps that come close to a singular state.
 
-        A step whose start is the singular one is searched together with the step before.
+        A step whose start is the singular one is searched together with the step before. What cannot
+        be located around an event that is known is that event: on a side branch that turns where it
+        crosses the symmetric one, the eigenvalue touches zero there, and the curve is singular.
         """
         rows, what = self.rows, self.rows.what
         at = np.flatnonzero((rows.stage == CONVERGED) & (what & (HIDDEN | EARLY) != 0))
         events = Events.join([], self.curve.metric.size)
         if self.options.look_inside and len(at):
-            events = inside_spans(self.curve.take(rows.lanes), self._spans(at, move), self.options)
+            span = self._spans(at, move)
+            events = inside_spans(self.curve.take(rows.lanes), span, self.options)
             lanes = rows.lanes[events.lanes]
             known = np.array([self._last.get(lane, -np.inf) for lane in lanes.tolist()])
-            fresh = np.abs(events.travelled - known) > NARROW
+            low, high = np.full((2, len(what)), [[np.inf], [-np.inf]])
+            np.minimum.at(low, span.lane, span.start)
+            np.maximum.at(high, span.lane, span.stop)
+            around = (low[events.lanes] <= known) & (known <= high[events.lanes])
+            fresh = (np.abs(events.travelled - known) > NARROW) & (events.found | ~around)
             events, lanes = events.take(fresh), lanes[fresh]
             self._last.update(zip(lanes.tolist(), events.travelled.tolist(), strict=True))
             self.hidden.append(replace(events, lanes=lanes))
