@@ -79,6 +79,9 @@ two events; below which it is searched for them; length from which on it is refu
 EARLY_NEAR, EARLY_DIP = 0.3, 0.5
 """Determinant at a start, and least one inside a first step, as shares of those at its ends, below
 which the step is searched: what came before it is not known."""
+SMALL = 0.02
+"""Determinant at the end of a step over that at its start below which the index of a point that is
+as far away as the last correction may be another one."""
 SLACK = 0.01
 """Slope of t that is no turn inside such a short step, as a share of those at its ends."""
 ROUND_OFF = 1e-14
@@ -172,7 +175,7 @@ def correct(dz, dt, tangent, slope, mass, trial, numbers, counts, active, accept
             if counts[ITERATION, i] == MOST_ITERATIONS:
                 counts[STAGE, i] = REFUSED
             continue
-        counts[STAGE, i] = CONVERGED
+        counts[STAGE, i], numbers[LAST, i] = CONVERGED, correction
         numbers[NORM, i] = norm
         numbers[NEW_SLOPE, i] = slope[i] / norm
         numbers[TURN, i] = np.arccos(min(1.0 / norm, 1.0))
@@ -217,7 +220,7 @@ def correct_arrivals(dz, tangent, slope, mass, places, numbers, counts, active):
         norm = norm if along > 0.0 else -norm
         numbers[NORM, i], numbers[NEW_SLOPE, i] = norm, slope[i] / norm
         way += weight * numbers[SLOPE, i] * (numbers[TRIAL, i] - numbers[T, i])
-        numbers[LENGTH, i], counts[STAGE, i] = way, CONVERGED
+        numbers[LENGTH, i], numbers[LAST, i], counts[STAGE, i] = way, 0.0, CONVERGED
 
 
 @njit(**{**BRIEF, "_nrt": True})
@@ -237,6 +240,10 @@ def judge(index, determinant, numbers, counts, active, smallest, locates, plain)
         start, end = numbers[T, i], numbers[TRIAL, i]
         flipped = np.sign(new) != np.sign(old)
         changed = abs(index[i] - counts[INDEX, i])
+        if (flipped or changed > 0 or _is_small(i, numbers)) and _is_rough(i, numbers, counts):
+            counts[STAGE, i], numbers[DEFECT, i] = CORRECTING, 0.0
+            counts[ITERATION, i] += 1
+            continue
         # a pair of eigenvalues that is always one by symmetry counts once in the determinant
         if changed == 2 and determinant[i] * numbers[DET, i] < 0.0:
             changed = 1
@@ -268,6 +275,18 @@ def judge(index, determinant, numbers, counts, active, smallest, locates, plain)
             close += (counts[WHAT, i] & HIDDEN) == 0
             counts[WHAT, i] |= EARLY
     return good, doubtful, close
+
+
+@njit(**INLINE)
+def _is_small(i, numbers):
+    """Whether the determinant at the end of a step is much smaller than at its start."""
+    return abs(numbers[NEW_DET, i]) < SMALL * abs(numbers[DET, i])
+
+
+@njit(**INLINE)
+def _is_rough(i, numbers, counts):
+    """Whether the last correction of a step was so large that its tangent is that of elsewhere."""
+    return numbers[LAST, i] > EXACT and counts[ITERATION, i] < MOST_ITERATIONS - 1
 
 
 @njit(**INLINE)
