@@ -8,6 +8,7 @@ from scipy.optimize import brentq
 import equimorph as em
 from equimorph.equilibria import ParameterLine, TraceOptions
 from equimorph.equilibria.trace import trace
+from equimorph.equilibria.trace_options import EventCode
 from oracles.polynomial import (
     Polynomial,
     bead_on_a_circle,
@@ -243,3 +244,34 @@ def test_two_folds_that_a_long_step_may_pass_are_met():
     turns = places[1:-1][np.diff(np.sign(np.diff(t))) != 0]
     assert len(turns) == 3
     np.testing.assert_allclose(found.passed.z[:, 0], turns, atol=1e-5)
+
+
+@pytest.mark.parametrize("look_inside", [False, True])
+@pytest.mark.parametrize("finer", [1.0, 0.35, 0.1225, 0.35**3])
+def test_side_branches_that_turn_at_a_pitchfork_meet_nothing_else(finer, look_inside):
+    """x = ±√|a| of ±x³ = a x: one branch point at a = 0, and back on the other side.
+
+    There the eigenvalue touches zero, and index and tangent are others within a correction of it.
+    As edges of sets are lifted.
+    """
+    random = np.random.default_rng(0)
+    options = TraceOptions(
+        through_folds=True, through_branch_points=True, first_step=0.05 * finer,
+        largest_step=0.5 * finer, smallest_step=1e-7 * finer**2, turning=0.25 * finer,
+        look_inside=look_inside,
+    )  # fmt: skip
+    for _ in range(20):
+        sign, k, m = (
+            random.choice([1.0, -1.0]),
+            10 ** random.uniform(-0.3, 3),
+            random.uniform(-2, 2),
+        )
+        form = slaved(pitchfork_form(sign, 10 ** random.uniform(-1, 1)), k, m)
+        start, end = sign * random.uniform(0.1, 2), -sign * random.uniform(0.1, 2)
+        line = ParameterLine(form, np.array([[start, 0.0]]), np.array([[end - start, 0.0]]))
+        x = np.sqrt(abs(start))
+        found = trace(line, np.array([[x, m * x**2]]), (), options)
+        assert found.code == EventCode.RETURNED
+        assert found.z[0, 0] == pytest.approx(-x, rel=1e-9)
+        assert found.passed.code.tolist() == [EventCode.BRANCH_POINT]
+        assert found.passed.z == pytest.approx(0.0, abs=1e-9)

@@ -105,8 +105,8 @@ class RareSteps:
     def _look_inside(self, move: Advance) -> None:
         """Search steps that come close to a singular state.
 
-        A step whose start is the singular one is searched together with the step before. What cannot
-        be located around an event that is known is that event: on a side branch that turns where it
+        A step whose start is the singular one is searched together with the step before. What
+        cannot be located around a known event is that event: on a side branch that turns where it
         crosses the symmetric one, the eigenvalue touches zero there, and the curve is singular.
         """
         rows, what = self.rows, self.rows.what
