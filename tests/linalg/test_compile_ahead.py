@@ -112,5 +112,5 @@ def test_a_study_needs_no_loops(monkeypatch: pytest.MonkeyPatch):
     ready = em.limit_load(start, "q")
     monkeypatch.setattr(compiled, "AWAITED", {each.name for each in loops})
     monkeypatch.setattr(compiled, "kept_signatures", lambda _: [])
-    assert len(loops) == 2
+    assert len(loops) == 3
     assert em.limit_load(start, "q").value == ready.value

@@ -73,8 +73,10 @@ class MinimaGraph:
         numbers = np.array(
             [self._number(*each) for each in zip(z, group.tolist(), strict=True)], int
         )
-        for number in range(before, len(self)):
+        number = before
+        while number < len(self):  # images that are added have images, too
             self._add_images(number, int(self.group[number]))
+            number += 1
         p = self.ground.p[self.group[before:]]
         self.index = np.append(self.index, self.ground.structure.index(self.z[before:], p))
         self._left = np.append(self._left, np.zeros(len(p), bool))
