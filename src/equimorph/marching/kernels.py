@@ -148,7 +148,9 @@ def correct(dz, dt, tangent, slope, mass, trial, numbers, counts, active, accept
         correction = _size(i, dz, dt[i], mass, weight)
         first = counts[ITERATION, i] == 0
         limit = FIRST_SHARE * numbers[LENGTH, i] if first else 0.5 * last
-        if not correction <= max(limit, accepted):
+        # beside another singular state round-off moves points by more than `accepted`
+        rough = not first and limit < correction <= ACCEPTED
+        if not (correction <= max(limit, accepted) or rough):
             counts[STAGE, i] = REFUSED
             continue
         total = 0.0
@@ -167,7 +169,7 @@ def correct(dz, dt, tangent, slope, mass, trial, numbers, counts, active, accept
             gain = correction / (last * last)
             numbers[GAIN, i] = max(gain, 1.0)
         close = correction <= nearly and 0.0 < gain * correction * correction <= NEXT
-        if not (correction <= accepted or close):
+        if not (correction <= accepted or close or rough):
             counts[ITERATION, i] += 1
             numbers[LAST, i] = correction
             # the closing equation is linear: the correction has met it
