@@ -17,6 +17,7 @@ from oracles.polynomial import (
     slaved,
     transcritical_form,
 )
+from oracles.specimens import portal
 from oracles.surfaces import butterfly
 
 factors = st.floats(0.1, 10.0)
@@ -275,3 +276,24 @@ def test_side_branches_that_turn_at_a_pitchfork_meet_nothing_else(finer, look_in
         assert found.z[0, 0] == pytest.approx(-x, rel=1e-9)
         assert found.passed.code.tolist() == [EventCode.BRANCH_POINT]
         assert found.passed.z == pytest.approx(0.0, abs=1e-9)
+
+
+def test_folds_are_located_beside_pitchforks_of_a_frame():
+    """Two states over a point of a frame lead over a fold and a pitchfork 3e-4 apart, and back.
+
+    With an eigenvalue of 1e-6 beside that which vanishes, round-off moves states by 1e-8.
+    """
+    frame = portal(50.0, 2, 8).resolving(4.67)
+    start = {"k": 0.0, "d": 0.18531122, "P": 2.5145, "q": 0.18140901}
+    found = em.find_equilibria(frame, start, within=[frame.max_curvature <= 3.2])
+    rate = np.array([[0.0, 0.00108076, 0.0, 0.00750963]])
+    line = ParameterLine(frame, found.p, np.repeat(rate, len(found), axis=0))
+    options = TraceOptions(
+        through_folds=True, through_branch_points=True, first_step=0.05, largest_step=0.5,
+        smallest_step=1e-7, turning=0.25, look_inside=False,
+    )  # fmt: skip
+    ends = trace(line, found.z, (frame.max_curvature <= 4.67,), options)
+    assert not ends.why
+    met = [ends.passed.code[ends.passed.lanes == lane].tolist() for lane in range(len(found))]
+    fold, branch = EventCode.FOLD, EventCode.BRANCH_POINT
+    assert sorted(met) == [[], [], [], [], [fold, branch], [branch], [branch], [branch, fold]]

@@ -224,3 +224,14 @@ def test_cells_turned_over_beside_a_bound_are_divided_where_sheets_cross_elsewhe
     )  # fmt: skip
     assert len(eset.crossings)
     assert eset.audit.clean, eset.audit
+
+
+@pytest.mark.slow
+def test_cells_turned_over_where_two_crossing_curves_meet_are_divided():
+    """Near (k, P) = (0.06, 2.0) cells have corners on both curves; folds are near pitchforks."""
+    frame = portal(50.0, 2, 8).resolving(4.65)
+    eset = em.equilibrium_set(
+        frame, em.Box(k=(-0.9012, 0.7189), P=(-4.639, 3.5699)), fixed={"d": 0.1821, "q": 0.0},
+        within=[frame.max_curvature <= 4.65], intervals=(11, 17),
+    )  # fmt: skip
+    assert eset.audit.clean, eset.audit

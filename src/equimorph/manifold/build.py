@@ -8,7 +8,7 @@ import numpy as np
 
 from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Items, Place
-from equimorph.manifold.complex.description import Frame, wrong_off_crossings
+from equimorph.manifold.complex.description import Frame, wrong_cells
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.manifold.complex.kept_sets import Effort, question_of_set, recall_set
 from equimorph.manifold.geometry.setting import Setting
@@ -333,15 +333,13 @@ class _Lifting:
 def _divide_wrong(pairing: Pairing, eset: EquilibriumSet) -> bool:
     """Bisect the grid cells below cells of a wrong index or sense, if there are any.
 
-    So it is where a constraint bends sharply: at a tip on it straight cells turn over. Cells at
-    crossings stay: these are lifted with several sheets at once.
+    So it is where a constraint bends sharply, and where two crossing curves meet: straight cells
+    turn over there.
     """
     mesh = pairing.mesh
     if not eset.audit.wrong or mesh.dimension == 1 or pairing.is_full:
         return False
-    middle = eset.coordinates[eset.cells[wrong_off_crossings(eset)]].mean(axis=1)
-    if len(middle) == 0:
-        return False
+    middle = eset.coordinates[eset.cells[wrong_cells(eset)]].mean(axis=1)
     around = np.unique([mesh.locate(place) for place in middle])
     sides = mesh.sides[around] if mesh.dimension == 2 else mesh.sides[mesh.faces[around]]
     chosen = longest_edges(mesh, sides.reshape(len(around), -1))

@@ -317,17 +317,14 @@ def overturned_cells(eset: EquilibriumSet) -> CellFlags:
     return senses(eset.cells, eset.cell_index, eset.coordinates, whole).overturned
 
 
-def wrong_off_crossings(eset: EquilibriumSet) -> CellFlags:
-    """Return which cells `Audit.wrong` counts, but for those with a vertex on a crossing."""
+def wrong_cells(eset: EquilibriumSet) -> CellFlags:
+    """Return which cells `Audit.wrong` counts."""
     coordinates, scales = eset.coordinates, eset.setting.scales
     crossings, whole = facets_of(eset.crossings, len(eset.names)), adjacency(eset.cells)
     sense = _senses(eset.cells, eset.cell_index, coordinates, crossings, whole, eset.component)
     off = overturned_off_folds(eset.kinds, eset.cells, sense.overturned, coordinates / scales)
     of_index = contradictions(eset.points, eset.kinds, eset.cells, eset.cell_index)
-    wrong = of_index | off | beyond_bounds(eset.points, eset.cells, eset.constraints)
-    crossed = np.zeros(len(eset.points), bool)
-    crossed[crossings] = True
-    return np.asarray(wrong & ~crossed[eset.cells].any(axis=1))
+    return of_index | off | beyond_bounds(eset.points, eset.cells, eset.constraints)
 
 
 SLIVER = 0.03
