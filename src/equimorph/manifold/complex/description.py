@@ -324,7 +324,7 @@ def wrong_cells(eset: EquilibriumSet) -> CellFlags:
     sense = _senses(eset.cells, eset.cell_index, coordinates, crossings, whole, eset.component)
     off = overturned_off_folds(eset.kinds, eset.cells, sense.overturned, coordinates / scales)
     of_index = contradictions(eset.points, eset.kinds, eset.cells, eset.cell_index)
-    return of_index | off | beyond_bounds(eset.points, eset.cells, eset.constraints)
+    return np.asarray(of_index | off | beyond_bounds(eset.points, eset.cells, eset.constraints))
 
 
 SLIVER = 0.03
