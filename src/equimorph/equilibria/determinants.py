@@ -35,8 +35,9 @@ def determinant(curve: Curve, z: Lanes, t: Values) -> Values:
 def may_vanish(values: Float[np.ndarray, "3 steps"]) -> Bool[np.ndarray, " steps"]:
     """Whether what has such values at start, middle and end may touch zero or cross it twice."""
     start, middle, end = np.sign(values[0]) * values
-    bow, slope = start + end - 2.0 * middle, end - start
+    # determinants of structures with hundreds of unknowns in space overflow: nothing is known then
     with np.errstate(divide="ignore", invalid="ignore"):
+        bow, slope = start + end - 2.0 * middle, end - start
         least = middle - slope * (slope / (8.0 * bow))  # a determinant's square may overflow
     dips = (np.abs(slope) < 2.0 * bow) & (least < EARLY_DIP * np.minimum(start, end))
     low = np.minimum(start, end) < EARLY_NEAR * middle

@@ -261,7 +261,8 @@ def _determinants(pairing: Pairing, points: Items) -> Values:
 def _are_steep(pairing: Pairing, rays: BothEnds) -> Flags:
     """Edges at an end of which the determinant changes much along some edge."""
     one, other = (_determinants(pairing, each.points) for each in rays)
-    much = np.abs(other - one) > STEEP * np.fmin(np.abs(one), np.abs(other))
+    with np.errstate(invalid="ignore"):  # of values that overflow
+        much = np.abs(other - one) > STEEP * np.fmin(np.abs(one), np.abs(other))
     steep = np.zeros(pairing.points.count, bool)
     for each in rays:
         steep[each.points[much]] = True
