@@ -15,7 +15,6 @@ SUMS = {**FLAGS, "fastmath": {"contract", "reassoc"}, "_nrt": False}
 """Sums over the entries of one lane may be reordered: always in the same way."""
 BRIEF = {**SUMS, "nogil": False}
 """Of kernels too short to let another thread in: taking turns would cost more than they do."""
-
 INLINE = {**SUMS, "forceinline": True}
 """Of parts of the work on one lane: their many arrays, passed on the stack, would take longer."""
 

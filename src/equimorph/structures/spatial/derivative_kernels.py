@@ -93,6 +93,24 @@ def turn_end(
 
 
 @njit(**INNER)
+def read_units(
+    pairs, parts, z, p, moves_z, moves_p, start, scalars, nodes, held, turned, given, y, square,
+    inverse, number, here, other, own, unit,
+):  # fmt: skip
+    """Unit quaternions of all nodes, clamps included, and multipliers, parameters and 1."""
+    m, first = scalars - p.shape[1] - 1, held[0]
+    read_jets(z, p, moves_z, moves_p, start, m, first, nodes, given, y)
+    for side in range(2):
+        if held[side]:
+            turn_end(
+                pairs, parts, side, side * (nodes - 1), nodes, scalars, turned, y, number,
+                here, other, own, unit,
+            )  # fmt: skip
+    for node in range(first, nodes - held[1]):
+        normalise_node(pairs, parts, nodes, node, given, square, inverse, here, other, unit)
+
+
+@njit(**INNER)
 def combine_jet(parts, scalars, e, i, table, picks, factor, y, out):
     """Add factor · Σ y · table, three rows a part."""
     for n in range(len(picks)):
@@ -168,17 +186,12 @@ def equations_lanes(
     rows = work_rows(parts * entries + 8)
     for block in range(0, z.shape[0], LANES):
         start = min(block, z.shape[0] - LANES)
-        read_jets(z, p, moves_z, moves_p, start, m, first, nodes, given, y)
-        for side in range(2):
-            if held[side]:
-                turn_end(
-                    pairs, parts, side, side * (nodes - 1), nodes, scalars, turned, y, number,
-                    here, other, own, unit,
-                )  # fmt: skip
+        read_units(
+            pairs, parts, z, p, moves_z, moves_p, start, scalars, nodes, held, turned, given, y,
+            square, inverse, number, here, other, own, unit,
+        )  # fmt: skip
         clear(slope, 0, 4 * parts * nodes)
         clear(rows, 0, parts * entries)
-        for node in range(first, stop):
-            normalise_node(pairs, parts, nodes, node, given, square, inverse, here, other, unit)
         for e in range(elements):
             for i in range(order):
                 base, weight = e * degree, weights[e, i]

@@ -12,12 +12,11 @@ from equimorph.structures.spatial.derivative_kernels import (
     combine_jet,
     copy_node,
     moments_of,
-    normalise_node,
-    read_jets,
+    read_units,
     stretches_of,
-    turn_end,
 )
 from equimorph.structures.spatial.jet_kernels import (
+    ONE,
     add,
     clear,
     in_space,
@@ -25,9 +24,6 @@ from equimorph.structures.spatial.jet_kernels import (
     on_axes,
     vector_multiply,
 )
-
-ONE = np.int64(1)
-"""Parts of the jets: values only."""
 
 
 @njit(**INNER)
@@ -88,16 +84,12 @@ def energies_lanes(
     no_z, no_p = np.empty((z.shape[0], 0, z.shape[1])), np.empty((z.shape[0], 0, p.shape[1]))
     for block in range(0, z.shape[0], LANES):
         start = min(block, z.shape[0] - LANES)
-        read_jets(z, p, no_z, no_p, start, m, first, nodes, given, y)
-        for side in range(2):
-            if held[side]:
-                turn_end(
-                    pairs, ONE, side, side * (nodes - 1), nodes, scalars, turned, y, number,
-                    here, other, own, unit,
-                )  # fmt: skip
+        read_units(
+            pairs, ONE, z, p, no_z, no_p, start, scalars, nodes, held, turned, given, y, square,
+            inverse, number, here, other, own, unit,
+        )  # fmt: skip
         total = _quadratic(m, scalars, quadratic, y)
         for node in range(first, stop):
-            normalise_node(pairs, ONE, nodes, node, given, square, inverse, here, other, unit)
             excess = load(square, node) - one
             total = total + spread(0.25 * lengths[node]) * excess * excess
         for e in range(elements):

@@ -23,13 +23,12 @@ from equimorph.structures.spatial.derivative_kernels import (
     combine_jet,
     copy_node,
     moments_of,
-    normalise_node,
-    read_jets,
+    read_units,
     stretches_of,
-    turn_end,
 )
 from equimorph.structures.spatial.force_kernels import turn_axes
 from equimorph.structures.spatial.jet_kernels import (
+    ONE,
     add,
     clear,
     in_space,
@@ -43,8 +42,6 @@ POLISHING = np.int64(4)
 LOWEST = 0.8
 """Least share of the largest κ² of all stations that one next to the extremum has: with five
 stations a degree cos(π/5), by the inequality in `largest_norms` of `rod.extrema`."""
-ONE = np.int64(1)
-"""Parts of the jets: values only."""
 
 
 @njit(**INNER)
@@ -214,9 +211,8 @@ def fields_lanes(
     largest: √(κ_n² + κ_b²), and its place.
     """
     elements, order, scalars = slopes.shape[0], slopes.shape[1], origin.shape[1]
-    degree, m = order - 1, scalars - p.shape[1] - 1
-    nodes, first = elements * degree + 1, held[0]
-    stop, soft, many = nodes - held[1], softness.shape[0] > 0, elements * order
+    degree, soft, many = order - 1, softness.shape[0] > 0, elements * order
+    nodes = elements * degree + 1
     given, unit, y = work_rows(4 * nodes), work_rows(4 * nodes), work_rows(scalars)
     square, inverse, number = work_rows(nodes), work_rows(nodes), work_rows(1)
     here, moved, other, own = work_rows(4), work_rows(4), work_rows(4), work_rows(4)
@@ -231,15 +227,10 @@ def fields_lanes(
     no_z, no_p = np.empty((z.shape[0], 0, z.shape[1])), np.empty((z.shape[0], 0, p.shape[1]))
     for block in range(0, z.shape[0], LANES):
         start = min(block, z.shape[0] - LANES)
-        read_jets(z, p, no_z, no_p, start, m, first, nodes, given, y)
-        for side in range(2):
-            if held[side]:
-                turn_end(
-                    pairs, ONE, side, side * (nodes - 1), nodes, scalars, turned, y, number,
-                    here, other, own, unit,
-                )  # fmt: skip
-        for node in range(first, stop):
-            normalise_node(pairs, ONE, nodes, node, given, square, inverse, here, other, unit)
+        read_units(
+            pairs, ONE, z, p, no_z, no_p, start, scalars, nodes, held, turned, given, y, square,
+            inverse, number, here, other, own, unit,
+        )  # fmt: skip
         for e in range(elements):
             base = e * degree
             clear(corner, 0, 4)

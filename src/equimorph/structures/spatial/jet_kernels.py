@@ -4,9 +4,14 @@ A jet of `parts` vectors has the rows of part 0, then of part 1, and so on. `pai
 product, part of the first factor, part of the second); all products add to what is there.
 """
 
+import numpy as np
+
 from equimorph.linalg.compiled import njit
 from equimorph.linalg.kernels import INNER
 from equimorph.linalg.simd import load, sincos, spread, square_root, store
+
+ONE = np.int64(1)
+"""Parts of jets that are values only."""
 
 
 @njit(**INNER)

@@ -78,6 +78,13 @@ def energy_tables(
     return *field_tables(model), whole, np.ascontiguousarray(model.quadratic)
 
 
+def condition_tables(model: SpatialModel) -> tuple[np.ndarray, ...]:
+    """What `phase_kernels.condition_lanes` shares among lanes, after the pairs of its jets."""
+    _, weights, *_, forces, picks, tension, tied, softness, turned, held = field_tables(model)
+    quadratic = np.ascontiguousarray(model.quadratic)
+    return weights, forces, picks, tension, tied, softness, turned, held, quadratic
+
+
 def field_tables(model: SpatialModel) -> tuple[np.ndarray, ...]:
     """Stiffnesses, loads and clamps by all scalars, at the nodes of elements in their order."""
     mesh = model.mesh

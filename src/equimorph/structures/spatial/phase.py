@@ -23,14 +23,15 @@ import numpy as np
 
 from equimorph.arrays import Flags, Float, Lanes, Parameters, Sides, Values
 from equimorph.linalg import BorderedSolution
-from equimorph.linalg.dense import multiply, no_border
+from equimorph.linalg.dense import no_border
 from equimorph.linalg.lanes import over_lanes
 from equimorph.structures.contract import Symmetry
 from equimorph.structures.equations import Advance, AnyBorder, Direction, Shift
 from equimorph.structures.spatial.lagrangian import HALF_TURN
-from equimorph.structures.spatial.mechanics import SpatialMechanics, field_tables, pairs_of
+from equimorph.structures.spatial.mechanics import SpatialMechanics, condition_tables, pairs_of
 from equimorph.structures.spatial.phase_condition import (
     breaking_scalars,
+    phase_of,
     phase_weight,
     with_phase_condition,
 )
@@ -138,21 +139,15 @@ class PinnedMechanics(SpatialMechanics):
     def _condition(self, z: Lanes, p: Parameters, void: Flags) -> tuple[Lanes, Values]:
         """∂F/∂μ, which is the gradient of the condition, and the condition's row of F."""
         gradients, values = np.empty(z.shape), np.empty(len(z))
-        inputs = [np.ascontiguousarray(z), np.ascontiguousarray(p)]
-        shared = pairs_of(1)[0], *self._condition_tables
+        inputs, shared = [*map(np.ascontiguousarray, (z, p))], (pairs_of(1)[0], *self._tables)
         over_lanes(condition_lanes, shared, inputs, [gradients, values])
         gradients[void], values[void] = 0.0, -z[void, -1]
         gradients[void, -1] = -1.0
         return gradients, values
 
     @cached_property
-    def _condition_tables(self) -> tuple[np.ndarray, ...]:
-        """What `phase_kernels.condition_lanes` shares among lanes, after the pairs of its jets."""
-        _, weights, *_, forces, picks, tension, tied, softness, turned, held = field_tables(
-            self.model
-        )
-        quadratic = np.ascontiguousarray(self.model.quadratic)
-        return weights, forces, picks, tension, tied, softness, turned, held, quadratic
+    def _tables(self) -> tuple[np.ndarray, ...]:
+        return condition_tables(self.model)
 
     @cached_property
     def bare(self) -> SpatialMechanics:
@@ -263,13 +258,9 @@ class PinnedMechanics(SpatialMechanics):
 
     def phase(self, z: Lanes) -> Values:
         """Angle by which a state is turned from one that the condition picks, −π/2 to π/2."""
-        inner = self.model.unknown_nodes
-        g = (phase_weight(self.mesh.nodes) * self.mesh.weights)[inner, None]
-        a, b, c, d = np.moveaxis(z[:, : self.unknowns].reshape(len(z), len(g), 4), -1, 0)
-        square = a * a + b * b + c * c + d * d
-        left, aside = (multiply(t / square, g)[:, 0] for t in (b * c + a * d, b * d - a * c))
-        side = np.where(left < 0.0, -1.0, 1.0)
-        return np.asarray(np.arctan2(side * aside, side * left))
+        weights, free = self.mesh.weights, self.model.unknown_nodes
+        q = z[:, : self.unknowns].reshape(len(z), self.unknowns // 4, 4)
+        return phase_of(q, (phase_weight(self.mesh.nodes) * weights)[free])
 
     def aligned(self, z: Lanes) -> Lanes:
         """The nearest states on their orbits that meet the phase condition."""

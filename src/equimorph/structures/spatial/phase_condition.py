@@ -4,8 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from equimorph.arrays import Float
+from equimorph.arrays import Float, Values
 from equimorph.errors import InputError
+from equimorph.linalg.dense import multiply
 from equimorph.structures.spatial.model import ANGLES, SpatialModel
 from equimorph.tolerances import SAME_NUMBER
 
@@ -20,6 +21,15 @@ def phase_weight(s: Float[np.ndarray, "..."]) -> Float[np.ndarray, "..."]:
     With both ends on the axis, c is the mean of z with the weight −g' = 1 + (1 − 2s)/2.
     """
     return np.asarray(2.0 - s - 0.5 * s * (1.0 - s))
+
+
+def phase_of(q: Float[np.ndarray, "lanes n 4"], weights: Float[np.ndarray, " n"]) -> Values:
+    """Angle from what the condition picks, −π/2 to π/2; weights: of g at the nodes."""
+    a, b, c, d = np.moveaxis(q, -1, 0)
+    square, by = a * a + b * b + c * c + d * d, weights[:, None]
+    left, aside = (multiply(t / square, by)[:, 0] for t in (b * c + a * d, b * d - a * c))
+    side = np.where(left < 0.0, -1.0, 1.0)
+    return np.asarray(np.arctan2(side * aside, side * left))
 
 
 def with_phase_condition(model: SpatialModel) -> SpatialModel:
