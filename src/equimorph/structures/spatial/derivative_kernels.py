@@ -92,7 +92,7 @@ def turn_end(
             store(unit, 4 * (part * nodes + node) + c, load(whole, 4 * part + c))
 
 
-@njit(**INNER)
+@njit(**INNER, forceinline=True)  # else its loops would not know the number of parts
 def read_units(
     pairs, parts, z, p, moves_z, moves_p, start, scalars, nodes, held, turned, given, y, square,
     inverse, number, here, other, own, unit,

@@ -79,10 +79,11 @@ def energy_tables(
 
 
 def condition_tables(model: SpatialModel) -> tuple[np.ndarray, ...]:
-    """What `phase_kernels.condition_lanes` shares among lanes, after the pairs of its jets."""
+    """What `phase_kernels.condition_lanes` shares among lanes."""
     _, weights, *_, forces, picks, tension, tied, softness, turned, held = field_tables(model)
     quadratic = np.ascontiguousarray(model.quadratic)
-    return weights, forces, picks, tension, tied, softness, turned, held, quadratic
+    tables = weights, forces, picks, tension, tied, softness, turned, held, quadratic
+    return pairs_of(1)[0], *tables
 
 
 def field_tables(model: SpatialModel) -> tuple[np.ndarray, ...]:

@@ -28,7 +28,7 @@ from equimorph.linalg.lanes import over_lanes
 from equimorph.structures.contract import Symmetry
 from equimorph.structures.equations import Advance, AnyBorder, Direction, Shift
 from equimorph.structures.spatial.lagrangian import HALF_TURN
-from equimorph.structures.spatial.mechanics import SpatialMechanics, condition_tables, pairs_of
+from equimorph.structures.spatial.mechanics import SpatialMechanics, condition_tables
 from equimorph.structures.spatial.phase_condition import (
     breaking_scalars,
     phase_of,
@@ -139,14 +139,14 @@ class PinnedMechanics(SpatialMechanics):
     def _condition(self, z: Lanes, p: Parameters, void: Flags) -> tuple[Lanes, Values]:
         """∂F/∂μ, which is the gradient of the condition, and the condition's row of F."""
         gradients, values = np.empty(z.shape), np.empty(len(z))
-        inputs, shared = [*map(np.ascontiguousarray, (z, p))], (pairs_of(1)[0], *self._tables)
-        over_lanes(condition_lanes, shared, inputs, [gradients, values])
+        inputs, outputs = [np.ascontiguousarray(z), np.ascontiguousarray(p)], [gradients, values]
+        over_lanes(condition_lanes, self._condition_tables, inputs, outputs)
         gradients[void], values[void] = 0.0, -z[void, -1]
         gradients[void, -1] = -1.0
         return gradients, values
 
     @cached_property
-    def _tables(self) -> tuple[np.ndarray, ...]:
+    def _condition_tables(self) -> tuple[np.ndarray, ...]:
         return condition_tables(self.model)
 
     @cached_property
