@@ -85,7 +85,7 @@ class Block:
         capacity = min(capacity, IN_CACHE) if compiled else capacity
         self.rows = Rows(capacity, curve.metric.size, len(constraints), events, options)
         self.rare = RareSteps(curve, constraints, options, self.rows)
-        self._most_events, none = events, np.zeros(0, np.int64)
+        self.most_events, none = events, np.zeros(0, np.int64)
         self._waiting, self._knobs, self._here = (none, none), options.table(), curve.take(none)
         self._rules = (
             options.smallest_step, options.locates_branch_points, curve.folds_change_index,
@@ -141,7 +141,7 @@ class Block:
         )  # fmt: skip
 
         def march(more: bool) -> int:
-            queue = (*self._waiting, self._most_events, more)
+            queue = (*self._waiting, self.most_events, more)
             files = rows.events.buffer, rows.points.buffer
             given = (problem, queue, block, space.columns, files, space.scratch, self._rules)
             why = steps.march(steps.tables, steps.bounds, *given)

@@ -195,7 +195,7 @@ class PointFile:
     """Regular points of all lanes, with the number of the try in which they were found."""
 
     def __init__(self, size: int, most: int, state: Names) -> None:
-        self._size, self._most, self._room = size, most, max(ROOM, 2 * most)
+        self._size, self._most, self._room = size, most, FIRST_ROOM * most
         self._state, self.buffer = state, self._new()
         self._parts: list[tuple[Points, Names]] = []
 
@@ -207,6 +207,8 @@ class PointFile:
         """Make room for one point of every lane."""
         if self._state[tick_kernels.POINTS] + self._most > self._room:
             self._seal()
+            self._room = max(self._room, min(2 * self._room, ROOM))
+            self.buffer = self._new()
 
     def _seal(self) -> None:
         z, values, names = self.buffer
@@ -214,7 +216,7 @@ class PointFile:
         lanes, index, tries = names[:, count]
         points = Points(lanes, values[0, count], z[count], values[1, count], index)
         self._parts.append((points, tries))
-        self._state[tick_kernels.POINTS], self.buffer = 0, self._new()
+        self._state[tick_kernels.POINTS] = 0
 
     def parts(self) -> list[tuple[Points, Names]]:
         """Everything so far, in parts."""
@@ -222,8 +224,9 @@ class PointFile:
         return self._parts
 
 
-ROOM = 4096
-"""Points in one part."""
+FIRST_ROOM, ROOM = 8, 4096
+"""Points in the first part for each lane, and in later ones: each has twice the room of the one
+before."""
 
 
 def compiled_steps(

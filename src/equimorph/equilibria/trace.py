@@ -26,8 +26,8 @@ Names = Numbers
 
 LANES_PER_THREAD = 128
 """A second thread is not worth its start for fewer lanes than this on each."""
-EVENTS_AT_ONCE = 512
-"""Brackets of events, over all lanes, that are located together."""
+EVENTS_AT_ONCE, OF_A_LANE = 512, 16
+"""Most brackets of events that are located together, over all lanes and of one lane."""
 REPORT_EVERY = 0.2
 """Seconds."""
 
@@ -84,8 +84,9 @@ def trace(
     queue = _Queue(len(z))
     ledger = _Ledger.of(z)
     capacity = max(1, min(batching.capacity, -(-len(z) // count)))
+    at_once = min(EVENTS_AT_ONCE, OF_A_LANE * len(z))
     jobs = [
-        _Job(Block(curve, z, constraints, options, capacity, EVENTS_AT_ONCE), queue, ledger)
+        _Job(Block(curve, z, constraints, options, capacity, at_once), queue, ledger)
         for _ in range(count)
     ]
     try:
@@ -167,7 +168,7 @@ class _Job:
         if block.busy:
             self._lose(block.run(self._more))
         waiting = block.rows.events.count + len(block.rare.hidden)
-        if waiting >= (EVENTS_AT_ONCE if block.busy else 1):
+        if waiting >= (block.most_events if block.busy else 1):
             self._locate()
         return block.busy or self._more
 

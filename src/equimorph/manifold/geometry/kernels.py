@@ -48,13 +48,31 @@ def match_or_add(vertices, z, mass, same, head, following, stored, count, ids, n
 
 
 @njit(nogil=True)
-def orient(cells, starts, neighbours, edge_in_cell, signs):
-    """Give every cell a sign so that neighbours agree; return the number of contradictions.
+def orient_facets(cells, signs):
+    """Orientation that each cell gives the facet opposite to each of its corners.
 
-    CSR adjacency: neighbours of cell c at starts[c] … starts[c + 1]; edge_in_cell is +1 where the
-    shared edge runs in opposite directions in both (already coherent), −1 where not.
+    Relative to the corners of the facet in the order of their numbers.
     """
-    contradictions = 0
+    corners = cells.shape[1]
+    for cell in range(cells.shape[0]):
+        for k in range(corners):
+            sign = 1 - 2 * (k % 2)
+            for i in range(corners):
+                for j in range(i + 1, corners):
+                    if k not in (i, j) and cells[cell, i] > cells[cell, j]:
+                        sign = -sign
+            signs[cell, k] = sign
+
+
+@njit(nogil=True)
+def orient(mates, induced, signs):
+    """Give every cell a sign so that neighbours agree; return twice the number of contradictions.
+
+    mates (cells, corners): flat place of each facet in the other of its two cells, −1 where there
+    is none; induced: see `orient_facets`. They agree where both orient their facet oppositely.
+    """
+    cells, corners = mates.shape
+    contradictions, facets = 0, induced.ravel()
     stack = np.empty(cells, np.int64)
     for seed in range(cells):
         if signs[seed] != 0:
@@ -64,13 +82,16 @@ def orient(cells, starts, neighbours, edge_in_cell, signs):
         while top > 0:
             top -= 1
             cell = stack[top]
-            for k in range(starts[cell], starts[cell + 1]):
-                other, wanted = neighbours[k], signs[cell] * edge_in_cell[k]
+            for k in range(corners):
+                mate = mates[cell, k]
+                if mate < 0:
+                    continue
+                other, sign = mate // corners, -signs[cell] * induced[cell, k] * facets[mate]
                 if signs[other] == 0:
-                    signs[other] = wanted
+                    signs[other] = sign
                     stack[top] = other
                     top += 1
-                elif signs[other] != wanted:
+                elif signs[other] != sign:
                     contradictions += 1
     return contradictions
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import combinations
 
 import numpy as np
@@ -21,7 +22,7 @@ from equimorph.arrays import (
     VertexNumbers,
 )
 from equimorph.linalg.graphs import components
-from equimorph.manifold.geometry.kernels import orient, walk_chains
+from equimorph.manifold.geometry.kernels import orient, orient_facets, walk_chains
 from equimorph.manifold.geometry.simplices import volumes
 
 PAIR = 2
@@ -33,15 +34,20 @@ class Adjacency:
     """Facets of cells, and how cells hang together across them.
 
     facets (F, d), sorted, with their cell counts; cell_facets (C, d + 1): facet opposite to each
-    corner; links: pairs of cells that share a facet (where more than two do, a chain of them), with
-    that facet.
+    corner; across: facets that pairs of cells share (where more than two do, a chain of pairs), and
+    places of these in the flat `cell_facets`.
     """
 
     facets: Int[np.ndarray, "F d"]
     counts: Int[np.ndarray, " F"]
     cell_facets: Cells
-    links: Int[np.ndarray, "N 2"]
     across: Int[np.ndarray, " N"]
+    places: Int[np.ndarray, "N 2"]
+
+    @cached_property
+    def links(self) -> Int[np.ndarray, "N 2"]:
+        """Pairs of cells that share a facet."""
+        return self.places // self.cell_facets.shape[1]
 
     @property
     def manifold(self) -> Bool[np.ndarray, " N"]:
@@ -120,8 +126,8 @@ def adjacency(cells: Cells) -> Adjacency:
         rows_of(keys.ravel()[order[starts[:-1]]], base, corners - 1),
         counts,
         of_cells.reshape(-1, corners),
-        np.stack([order[same], order[same + 1]], axis=1) // corners,
         number[same],
+        np.stack([order[same], order[same + 1]], axis=1),
     )
 
 
@@ -208,37 +214,18 @@ def chains(pairs: Pairs) -> list[Int[np.ndarray, "..."]]:
 
 def orientation(cells: Cells, whole: Adjacency) -> tuple[CellNumbers, int]:
     """Signs that orient all cells coherently, and the number of contradictions."""
-    count = len(cells)
-    induced = _induced_signs(cells)
-    a, b = whole.links[whole.manifold].T
-    shared = whole.across[whole.manifold]
-    sign = -_sign_at(whole, induced, a, shared) * _sign_at(whole, induced, b, shared)
-    both = np.concatenate([np.stack([a, b, sign], 1), np.stack([b, a, sign], 1)])
-    both = both[np.argsort(both[:, 0] * count + both[:, 1])]
-    starts = np.concatenate([[0], np.cumsum(np.bincount(both[:, 0], minlength=count))])
-    signs = np.zeros(count, np.int64)
-    columns = [np.ascontiguousarray(both[:, k]) for k in (1, 2)]
-    return signs, int(orient(count, starts, columns[0], columns[1], signs)) // 2
+    mates = np.full(cells.size, -1)
+    first, second = whole.places[whole.manifold].T
+    mates[first], mates[second] = second, first
+    signs = np.zeros(len(cells), int)
+    return signs, int(orient(mates.reshape(cells.shape), _induced_signs(cells), signs)) // 2
 
 
 def _induced_signs(cells: Cells) -> Cells:
     """Orientation that each cell gives its facets, relative to their vertices in order."""
-    corners = cells.shape[1]
-    signs = np.empty(cells.shape, np.int64)
-    for k in range(corners):
-        rest = np.delete(cells, k, axis=1)
-        turned = sum(
-            (rest[:, i] > rest[:, j]).astype(int) for i, j in combinations(range(corners - 1), 2)
-        )
-        signs[:, k] = (-1) ** (k + np.asarray(turned))
+    signs = np.empty(cells.shape, int)
+    orient_facets(np.ascontiguousarray(cells), signs)
     return signs
-
-
-def _sign_at(
-    whole: Adjacency, induced: Cells, cell: Int[np.ndarray, " N"], facet: Int[np.ndarray, " N"]
-) -> Int[np.ndarray, " N"]:
-    corner = (whole.cell_facets[cell] == facet[:, None]).argmax(axis=1)
-    return np.asarray(induced[cell, corner])
 
 
 def projected_volume(

@@ -25,65 +25,10 @@ LONGEST = 0.5
 """Step in the metric above which the cheap way is not tried."""
 LEFT = 1e-8
 """Length of a correction that is left to the tangents (see `Slopes`), which come with one."""
-STEPS = 4
-"""Number of equal steps into which long edges are cut before they count as hard."""
 SAFE = Guards(
     iterations=7, longest=np.inf, converged=1e-8, contraction=0.5, multipliers=MULTIPLIER_WEIGHT
 )
 """Corrections that shrink by half; applying the last one squares it."""
-
-
-@dataclass(frozen=True)
-class Direct:
-    """Points over the other ends, which of them can be trusted, and which need pseudo-arclength.
-
-    hard: equal steps would not lead there, either: a constraint is violated, or the first
-    correction is as long as the step, so that it would exceed a share of shorter ones, too.
-    """
-
-    z: Lanes
-    good: Flags
-    hard: Flags
-
-
-def lift_directly(
-    line: ParameterLine,
-    z: Lanes,
-    index: Numbers,
-    constraints: tuple[Constraint, ...],
-    steps: int = STEPS,
-) -> Direct:
-    """Tangent predictor over parts of edges, Newton at their ends, and the tests of a safe step.
-
-    Edges are cut into equal `steps`; each must be safe. A lane is good if the first correction
-    is below a quarter of the step, later ones shrink at least by half, the index is that of the
-    start, the tangents differ by less than acos 0.9, and no constraint is violated. Points are
-    polished but for the last correction.
-    """
-    lanes, out, good = np.arange(len(z)), z.copy(), np.zeros(len(z), bool)
-    for number in range(steps):
-        start = line.start[lanes] + (number / steps) * line.velocity[lanes]
-        part = ParameterLine(line.structure, start, line.velocity[lanes] / steps)
-        direct = _step(part, out[lanes], index[lanes], constraints)
-        lanes = lanes[direct.good]
-        out[lanes] = direct.z[direct.good]
-    good[lanes] = True
-    return Direct(out, good, ~good)
-
-
-def _step(
-    line: ParameterLine, z: Lanes, index: Numbers, constraints: tuple[Constraint, ...]
-) -> Direct:
-    """One step over each line, verified."""
-    still, one, none = np.zeros_like(z), np.ones(len(z)), np.zeros(len(z))
-    first = line.advance(z, none, still, one, none)
-    length = np.sqrt(squared_length(line.structure, line.weight, first.tangent_z, one))
-    out, good = z + first.tangent_z, (length < LONGEST) & (first.index == index)
-    todo = np.flatnonzero(good)
-    tangent = first.tangent_z[todo]
-    end = correct_ends(line.take(todo), out[todo], tangent, length[todo], index[todo], constraints)
-    out[todo], good[todo] = end.z, end.good
-    return Direct(out, good, ~good)
 
 
 def correct_ends(
@@ -93,8 +38,13 @@ def correct_ends(
     length: Values,
     index: Numbers,
     constraints: tuple[Constraint, ...],
-) -> Direct:
-    """Newton's method at the ends of steps of some length along tangents, and the tests of them."""
+) -> tuple[Lanes, Flags]:
+    """Points at the ends of steps of some length along tangents, and which can be trusted.
+
+    A point can be if the first correction is below a quarter of the step, later ones shrink at
+    least by half, the index is that of the start, the tangents differ by less than acos 0.9, and no
+    constraint is violated. Points are polished but for the last correction.
+    """
     structure, weight, one = line.structure, line.weight, np.ones(len(guess))
     p = line.parameters(one)
     longest = np.maximum(FIRST_SHARE * length, SAFE.converged)
@@ -105,10 +55,8 @@ def correct_ends(
     end_length = np.sqrt(squared_length(structure, weight, end_tangent, one))
     good = np.asarray(end.found & (product >= LEAST_COSINE * length * end_length))
     own = np.flatnonzero(good)
-    good[own] = feasible = are_feasible(constraints, end.z[own], p[own])
-    hard = np.asarray(end.first >= STEPS * FIRST_SHARE * length)
-    hard[own] = ~feasible
-    return Direct(end.z, good, hard)
+    good[own] = are_feasible(constraints, end.z[own], p[own])
+    return end.z, good
 
 
 EFFORTS = 4

@@ -25,13 +25,7 @@ from equimorph.equilibria.steps import Bracket, Front, least_inside
 from equimorph.errors import InputError
 from equimorph.linalg.lanes import over_lanes
 from equimorph.manifold.geometry.points import VertexKind
-from equimorph.manifold.lifting.edges import (
-    LONGEST,
-    Direct,
-    correct_ends,
-    lift_directly,
-    trace_rays,
-)
+from equimorph.manifold.lifting.edges import LONGEST, correct_ends, trace_rays
 from equimorph.manifold.lifting.kernels import flag_first_of_alike, match_rays
 from equimorph.manifold.lifting.pairing import Pairing, RayMark, Rays
 from equimorph.marching.kernels import EARLY_DIP, LEAST_COSINE, MULTIPLIER_WEIGHT
@@ -80,15 +74,10 @@ class Ends(Columns):
 def flood(pairing: Pairing, progress: Progress) -> None:
     """Lift edges from all known points until every ray is traced or given up.
 
-    All rays that one step can lift go first, then those that a few equal steps can; the rest wait
-    and are traced many at a time.
+    All rays that one step can lift go first; the rest wait and are traced many at a time.
     """
     while not pairing.is_full:
         flood_directly(pairing, progress)
-        long = pairing.rays_with(RayMark.LONG)
-        if len(long.points):
-            _lift_long(pairing, long)
-            continue
         take_back_hiding(pairing)
         hard = _one_of_each_pair(pairing, pairing.rays_with(RayMark.HARD))
         if len(hard.points) == 0:
@@ -144,7 +133,7 @@ def _step_over(pairing: Pairing, rays: Rays) -> None:
         known = np.flatnonzero(ends.partners >= 0)
         pairing.enter_many(some.take(known), ends.partners[known])
         new = ends.first_of_alike(pairing)
-        pairing.mark(some.take(new | (ends.partners == TOO_LONG)), RayMark.LONG)
+        pairing.mark(some.take(new | (ends.partners == TOO_LONG)), RayMark.HARD)
         _lift_to_new_ends(pairing, some.take(new), ends.take(new))
 
 
@@ -153,21 +142,8 @@ def _lift_to_new_ends(pairing: Pairing, rays: Rays, ends: Ends) -> None:
     store, line = pairing.points, pairing.line(rays)
     tangent, index = ends.guesses - store.z[rays.points], store.index[rays.points]
     constraints = pairing.setting.constraints
-    direct = correct_ends(line, ends.guesses, tangent, ends.lengths, index, constraints)
-    pairing.mark(rays.take(direct.hard), RayMark.HARD)
-    _enter_lifted(pairing, rays, direct)
-
-
-def _lift_long(pairing: Pairing, rays: Rays) -> None:
-    """Enter the curves of rays that a few equal steps lift; the rest count as hard."""
-    rays = _without_difficult(pairing, rays)
-    pairing.mark(rays, RayMark.HARD)
-    store = pairing.points
-    for at in range(0, len(rays.points), CHUNK):
-        some = rays.take(slice(at, at + CHUNK))
-        start = store.z[some.points], store.index[some.points]
-        direct = lift_directly(pairing.line(some), *start, pairing.setting.constraints)
-        _enter_lifted(pairing, some, direct)
+    z, good = correct_ends(line, ends.guesses, tangent, ends.lengths, index, constraints)
+    _enter_lifted(pairing, rays.take(good), z[good])
 
 
 def _without_difficult(pairing: Pairing, rays: Rays) -> Rays:
@@ -177,10 +153,9 @@ def _without_difficult(pairing: Pairing, rays: Rays) -> Rays:
     return rays.take(~difficult)
 
 
-def _enter_lifted(pairing: Pairing, rays: Rays, direct: Direct) -> None:
+def _enter_lifted(pairing: Pairing, done: Rays, z: Lanes) -> None:
     """Enter the curves of rays that were lifted to points over their other ends."""
     store, setting, mesh = pairing.points, pairing.setting, pairing.mesh
-    done, z = rays.take(direct.good), direct.z[direct.good]
     vertices = mesh.edges[done.edges, 1 - done.sides]
     p = setting.parameters(mesh.vertices[vertices])
     # where it is lifted in one sweep, the index stays what it was

@@ -87,10 +87,8 @@ class RayMark(IntEnum):
     UNTRACED = -1
     ABANDONED = -2
     """Tracing failed with every effort."""
-    LONG = -3
+    HARD = -3
     """One step cannot lift them."""
-    HARD = -4
-    """A few steps cannot, either."""
 
 
 class Curves:
