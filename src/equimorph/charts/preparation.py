@@ -158,7 +158,7 @@ def flip_inverted_triangles(
 def _without(whole: Adjacency, apart: Bool[np.ndarray, " F"]) -> Adjacency:
     """Adjacency that does not connect cells across some facets."""
     some = ~apart[whole.across]
-    return replace(whole, links=whole.links[some], across=whole.across[some])
+    return replace(whole, places=whole.places[some], across=whole.across[some])
 
 
 def _flip_once(

@@ -47,7 +47,7 @@ class Adjacency:
     @cached_property
     def links(self) -> Int[np.ndarray, "N 2"]:
         """Pairs of cells that share a facet."""
-        return self.places // self.cell_facets.shape[1]
+        return np.asarray(self.places // self.cell_facets.shape[1])
 
     @property
     def manifold(self) -> Bool[np.ndarray, " N"]:
