@@ -151,6 +151,8 @@ class NormalForm:
     ``B = φᵀD²F[φ, (ψ, dp)]``, ``C = φᵀD²F[(ψ, dp), (ψ, dp)]`` (Lyapunov–Schmidt reduction).
     """
 
+    at: Critical
+    """The points, with a border such that v = φ."""
     phi: Lanes
     psi: Lanes
     quadratic: Values
@@ -159,9 +161,11 @@ class NormalForm:
     """B."""
     path: Values
     """C."""
-    cubic: Values
-    """c."""
-    cubic_scale: Values
+
+    @property
+    def cubic(self) -> Values:
+        """c, by differences: not computed unless it is asked for."""
+        return self.at.cubic
 
     @property
     def discriminant(self) -> Values:
@@ -177,9 +181,9 @@ class NormalForm:
         straight one is not, "subcritical" if c < 0, "degenerate" if c is not known from zero.
         """
         skew = np.abs(self.quadratic) > np.maximum(
-            SKEW * np.abs(self.cubic), 1e-9 * self.cubic_scale
+            SKEW * np.abs(self.cubic), 1e-9 * self.at.cubic_scale
         )
-        unknown = np.abs(self.cubic) <= DEGENERATE * self.cubic_scale
+        unknown = np.abs(self.cubic) <= DEGENERATE * self.at.cubic_scale
         kinds = np.where(self.cubic > 0.0, "supercritical", "subcritical")
         kinds = np.where(unknown, "degenerate", kinds)
         crossing = np.where(self.discriminant > 0.0, "transcritical", "isola")
@@ -198,15 +202,8 @@ def normal_form(structure: Equations, z: Lanes, p: Parameters, dp: Parameters) -
     rhs[:, 0, :-1] = -structure.parameter_derivative(z, p, dp)
     psi = np.ascontiguousarray(at.solve(rhs)[:, 0, :-1])
     twice = structure.second_derivative(z, p, (psi, dp), (psi, dp))
-    return NormalForm(
-        phi,
-        psi,
-        at.second(phi, still),
-        at.second(psi, dp),
-        np.einsum("li,li->l", phi, twice),
-        at.cubic,
-        at.cubic_scale,
-    )
+    path = np.asarray(np.einsum("li,li->l", phi, twice))
+    return NormalForm(at, phi, psi, at.second(phi, still), at.second(psi, dp), path)
 
 
 def criticality(curve: Curve, z: Lanes, t: Values) -> list[str]:

@@ -77,6 +77,8 @@ class Span(Columns):
 
 def inside_spans(curve: Curve, span: Span, options: TraceOptions) -> Events:
     """Events between two points of lanes that neither the index nor the direction shows."""
+    if len(span.lane) == 0:
+        return Events.join([], curve.metric.size)
     here = curve.take(span.lane)
     low, high = probe_at(here, span.before, span.start), probe_at(here, span.after, span.stop)
     smaller, larger = np.sort(np.abs([low.value, high.value]), axis=0)

@@ -126,18 +126,18 @@ def locate_branch_point(curve: Curve, bracket: Bracket) -> Located:
     crossing, frame = (Crossing(directions),), _across(curve, b)
     found = settle(equations, z, p, directions, crossing, AT_ROUND_OFF, frame, frames=False)
     z, t = found.z, found.p[:, 0].copy()
-    exists = found.found & _crosses(equations, found, directions[:, 0], b)
-    good = np.asarray(exists & _inside(curve, bracket, z, t))
+    inside = found.found & _inside(curve, bracket, z, t)
+    good = _crosses(equations, found, np.flatnonzero(inside), directions[:, 0], b)
     return Located(z, t, _arclength(curve, bracket, z, t, share), good)
 
 
-def _crosses(equations: AlongCurve, found: Settled, step: Parameters, b: Lanes) -> Flags:
-    """Whether curves cross at points where F + βb = 0, or pass each other at a distance.
+def _crosses(equations: AlongCurve, found: Settled, at: Some, step: Parameters, b: Lanes) -> Flags:
+    """Which of some points where F + βb = 0 are crossings of curves that do not pass at a distance.
 
     By the reduced equation ``β (φ·b) + ½ (Aξ² + 2Bξτ + Cτ²) = 0``, so that neither the unit of the
     energy nor the number of unknowns counts.
     """
-    crosses, at = found.found.copy(), np.flatnonzero(found.found)
+    crosses = np.zeros(len(found.z), bool)
     form = normal_form(equations, found.z[at], found.p[at], step[at])
     rise = np.abs(found.unfolding[at] * np.einsum("li,li->l", form.phi, b[at]))
     bend = np.max(np.abs([form.quadratic, form.mixed, form.path]), axis=0)

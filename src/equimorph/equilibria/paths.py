@@ -124,7 +124,7 @@ def lift_one(
             outcome = with_hidden_events(begun.curve, begun.z, outcome, options)
         outcome = with_multiple_points(begun.curve, begun.z, outcome)
         aside = _vanishing_events(begun.curve, begun.z, outcome)
-        pieces.append(_segment(begun.curve, outcome, number, within, aside=aside))
+        pieces.append(_segment(begun.curve, outcome, number, within, aside))
         if pieces[-1].events[-1].kind != "arrived":
             break
         here = pieces[-1].events[-1].state
@@ -137,7 +137,7 @@ def lift_legs(states: States, within: tuple[Constraint, ...], options: TraceOpti
     """Path through states that are known, its straight legs followed side by side.
 
     As from the first of them in turn, in the time of the longest leg. None unless every leg leads
-    from one state to the next.
+    from one state to the next and passes nothing on its way.
     """
     structure, begin, end = states.structure, states[:-1], states[1:]
     options = replace(options, record=True, look_inside=False)
@@ -149,10 +149,27 @@ def lift_legs(states: States, within: tuple[Constraint, ...], options: TraceOpti
     outcome = with_multiple_points(curve, begin.z, outcome)
     n = structure.unknowns
     gap = np.sqrt((outcome.z[:, :n] - end.z[:, :n]) ** 2 @ structure.mass)
-    if not ((outcome.code == EventCode.ARRIVED) & (gap < JOINED)).all():
+    arrived = (outcome.code == EventCode.ARRIVED) & (gap < JOINED)
+    if len(outcome.passed.lanes) or not arrived.all():
         return None
-    lanes = range(len(begin))
-    return _join(states[0], [_segment(curve, outcome, lane, within, lane) for lane in lanes])
+    return _chain(states[0], curve, outcome, within)
+
+
+def _chain(start: State, curve: Curve, outcome: Traces, within: tuple[Constraint, ...]) -> Path:
+    """Path over lanes that arrived where the next one starts."""
+    count, travelled = len(outcome.code), outcome.travelled
+    points = outcome.points.take(outcome.points.travelled < travelled[outcome.points.lanes])
+    lane = np.concatenate([points.lanes, np.arange(count)])
+    length = np.concatenate([points.travelled, travelled])
+    order = np.lexsort((length, lane))
+    lane, length = lane[order], length[order]
+    t = np.concatenate([points.t, outcome.t])[order]
+    z, p = curve.take(lane).states(np.concatenate([points.z, outcome.z])[order], t)
+    index = np.concatenate([points.index, outcome.index])[order]
+    length += np.concatenate([[0.0], np.cumsum(travelled)])[lane]
+    last = np.array([count - 1])
+    end = _end(curve.take(last), _lane(outcome, count - 1), count - 1, within)
+    return _join(start, [_Segment(z, p, lane + t, length, index, (end,))])
 
 
 class Passed(NamedTuple):
@@ -175,15 +192,16 @@ class _Segment:
 
 
 def _segment(
-    curve: Curve, outcome: Traces, number: int, within: tuple[Constraint, ...], lane: int = 0,
-    aside: Sequence[Passed] = ()
-) -> _Segment:  # fmt: skip
-    """One lane of an outcome, as leg number so much of a path.
+    curve: Curve,
+    outcome: Traces,
+    number: int,
+    within: tuple[Constraint, ...],
+    aside: Sequence[Passed],
+) -> _Segment:
+    """The only lane of an outcome, as leg number so much of a path.
 
     `aside`: events that do not stop a path, by their length on it; their `at` counts from 0.
     """
-    if len(outcome.code) > 1:
-        curve, outcome = curve.take(np.array([lane])), _lane(outcome, lane)
     passed = [*zip(outcome.passed.travelled, _events_passed(curve, outcome, number), strict=True)]
     passed += [(length, replace(one, at=number + one.at)) for length, one in aside]
     passed.sort(key=lambda each: each[0])
