@@ -22,12 +22,11 @@ from equimorph.tasks.planning.network import (
     explain_no_route,
 )
 from equimorph.tasks.planning.objectives import ROUGH, Extreme
-from equimorph.tasks.planning.shortening import Shortener
 from equimorph.tasks.planning.straightening import (
+    best_corners,
     follow_direction,
     order_ends,
     route_over_corners,
-    straight_corners,
 )
 from equimorph.tasks.route import Route, describe_place, refusal
 from equimorph.tasks.stable_part import cell_near
@@ -86,10 +85,10 @@ def route_with_reserve(
 ) -> Route | None:
     """Return a route, arrived or refused, for demands and tightened ones; None without a path."""
     demands, tightened = given
-    path = _path(eset, ends, tightened, passing)
-    if path is None:
+    paths = _paths(eset, ends, tightened, passing)
+    if not paths:
         return None
-    (corners,) = straight_corners(eset, [path], tightened)
+    corners = best_corners(eset, paths, tightened)
     return route_over_corners(eset, follow_direction(corners, ends), demands, monitor)
 
 
@@ -99,35 +98,26 @@ def _least_margin(ends: Ends, passing: Passing | None) -> float:
     return float(min(margins))
 
 
-def _path(
+def _paths(
     eset: EquilibriumSet, ends: Ends, demands: Demands, passing: Passing | None
-) -> States | None:
-    """Cheapest path between the ordered ends over the network, and a pass; else the lowest way."""
+) -> list[States]:
+    """Cheapest path between the ordered ends over the network, and a pass; else the lowest way.
+
+    Where the length counts, and there is no pass, other cheap paths apart from it, too: over the
+    mesh paths are up to a tenth too long, each by another part.
+    """
     first, last = order_ends(ends)
     over = None if passing is None else _link_over(passing, demands)
     for way in () if over is None else (over, over[::-1]):
         parts = (cheapest_path(eset, (first, way[0]), demands), way[1:-1],
                  cheapest_path(eset, (way[-1], last), demands))  # fmt: skip
         if parts[0] is not None and parts[2] is not None:
-            return join_states(eset.structure, [each for each in parts if each is not None])
-    path = _best_path(eset, (first, last), demands)
-    if path is not None or passing is None:
-        return path
-    return passing.way if order_ends(ends) is ends else passing.way[::-1]
-
-
-def _best_path(eset: EquilibriumSet, ends: Ends, demands: Demands) -> States | None:
-    """Cheapest path, or another cheap one, apart from it, with a shorter curve beside it.
-
-    Over the mesh paths are up to a tenth too long, each by another part.
-    """
-    if not demands.objective.is_length:
-        return cheapest_path(eset, ends, demands)
-    paths = list(islice(cheap_paths(eset, ends, demands), MOST_PATHS))
-    if len(paths) < 2:
-        return paths[0] if paths else None
-    lengths = Shortener(eset, demands).rough_lengths(paths)
-    return paths[int(np.argmin(lengths))]
+            return [join_states(eset.structure, [each for each in parts if each is not None])]
+    most = MOST_PATHS if demands.objective.is_length else 1
+    paths = list(islice(cheap_paths(eset, (first, last), demands), most))
+    if paths or passing is None:
+        return paths
+    return [passing.way if order_ends(ends) is ends else passing.way[::-1]]
 
 
 def _link_over(passing: Passing, demands: Demands) -> States | None:

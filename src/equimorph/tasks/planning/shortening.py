@@ -38,7 +38,7 @@ STEPS, HALVINGS = 12, 5
 ENOUGH, NEARLY = 1e-4, 1e-2
 """Share of the squared length that the last step gains: of all, and before walls are weaker."""
 
-FEW, NODES, MOST_NODES = 20, 48, 192
+FEW, NODES, MOST_NODES = 24, 48, 192
 """Nodes of a rough curve, of a fine one, and most after legs that cannot be lifted were divided."""
 STRENGTHS = (0.1, 0.03, 0.01)
 """Strengths of the walls, one after the other: curves bend along a wall at half of it times the
@@ -88,14 +88,23 @@ class Shortener:
             todo = self._link(todo, (strength,), found) if todo else todo
         return [self._steps.states(found[k]) if k in found else None for k in range(len(paths))]
 
-    def rough_lengths(self, paths: Sequence[States]) -> list[float]:
-        """Lengths of shortened curves of few nodes near paths; infinite without one."""
-        curves, lengths = [self._curve_along(path, FEW) for path in paths], [np.inf] * len(paths)
-        some = {k: curve for k, curve in enumerate(curves) if curve is not None}
-        shorter = self._shorten(list(some.values()), STRENGTHS) if some else []
-        for k, curve in zip(some, shorter, strict=True):
-            lengths[k] = float(self._gaps(self._steps.states(curve)).sum())
-        return lengths
+    def shortest_near(self, paths: Sequence[States]) -> tuple[int, States | None]:
+        """Which path has the shortest curve nearby, judged by rough ones, and that curve's nodes.
+
+        The fine curve begins with the rough one, its legs halved, unless it keeps a margin.
+        """
+        along = {k: self._curve_along(path, FEW) for k, path in enumerate(paths)}
+        some = {k: curve for k, curve in along.items() if curve is not None}
+        best, found = 0, dict[int, Curves]()
+        if some:
+            rough = dict(zip(some, self._shorten(list(some.values()), STRENGTHS), strict=True))
+            best = min(rough, key=lambda k: float(self._gaps(self._steps.states(rough[k])).sum()))
+        if some and self.demands.margin == 0.0:  # else floors are those of longer legs
+            fine = self._halved(rough[best], np.arange(len(rough[best].z) - 1))
+            self._link({} if fine is None else {best: fine}, STRENGTHS[-1:], found)
+        if found:
+            return best, self._steps.states(found[best])
+        return best, self.curves_near([paths[best]])[0]
 
     def _curve_along(self, path: States, count: int) -> Curves | None:
         """Curve along a path, of about so many nodes; None of one node, or if one meets a wall."""
@@ -134,7 +143,7 @@ class Shortener:
         Legs that cannot, or whose lifts are longer, are divided.
         """
         left = dict[int, Curves]()
-        for _ in range(DIVISIONS):
+        for _ in range(DIVISIONS if todo else 0):
             shorter = self._shorten(list(todo.values()), strengths)
             curves, todo, strengths = zip(todo, shorter, strict=True), {}, strengths[-1:]
             for (k, curve), (linked, good) in zip(curves, self._lifts(shorter), strict=True):

@@ -272,18 +272,19 @@ def straight_corners(
     eset: EquilibriumSet, paths: Sequence[States], demands: Demands, same_class: bool = False
 ) -> list[States]:
     """Corners of straightened paths, both ends of each among them."""
-    closely = _closely(paths, demands)
-    curves = Shortener(eset, closely).curves_near(paths)
+    curves = Shortener(eset, _closely(paths, demands)).curves_near(paths)
     return [
-        _cheapest_corners(
-            eset,
-            path,
-            demands,
-            None if curve is None else _thin_out(curve, closely, same_class, FINE_GAIN),
-            same_class,
-        )
-        for path, curve in zip(paths, curves, strict=True)
+        _cheapest_corners(eset, *each, demands, same_class)
+        for each in zip(paths, curves, strict=True)
     ]
+
+
+def best_corners(eset: EquilibriumSet, paths: Sequence[States], demands: Demands) -> States:
+    """Corners of the path, of those given, whose shortest curve is the shortest, straightened."""
+    if len(paths) == 1:
+        return straight_corners(eset, paths, demands)[0]
+    best, curve = Shortener(eset, _closely(paths, demands)).shortest_near(paths)
+    return _cheapest_corners(eset, paths[best], curve, demands, same_class=False)
 
 
 def _closely(paths: Sequence[States], demands: Demands) -> Demands:
@@ -296,9 +297,11 @@ def _closely(paths: Sequence[States], demands: Demands) -> Demands:
 
 
 def _cheapest_corners(
-    eset: EquilibriumSet, path: States, demands: Demands, shortest: States | None, same_class: bool
+    eset: EquilibriumSet, path: States, curve: States | None, demands: Demands, same_class: bool
 ) -> States:
     """Corners of the shortest curve near a path, or cheaper ones where other than lengths count."""
+    closely = _closely([path], demands)
+    shortest = None if curve is None else _thin_out(curve, closely, same_class, FINE_GAIN)
     if shortest is not None and demands.objective.is_length:
         return shortest
     free = np.array([position(eset.structure.parameters, name) for name in eset.names])
