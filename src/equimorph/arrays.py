@@ -25,6 +25,8 @@ Parameters = Float[np.ndarray, "lanes parameters"]
 """All parameters p of the structure, in its order, for each lane."""
 Values = Float[np.ndarray, " lanes"]
 """One scalar a lane."""
+Determinants = Float[np.ndarray, "lanes 2"]
+"""A determinant m·2^e a lane, as m and e; see `linalg.determinants`."""
 Flags = Bool[np.ndarray, " lanes"]
 """One truth value a lane."""
 Nodal = Float[np.ndarray, "lanes nodes"]

@@ -5,6 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from hypothesis import Phase, example, given, settings, strategies as st
+from scipy.optimize import brentq
+from scipy.special import airy
 
 import equimorph as em
 from equimorph.equilibria import ParameterLine, TraceOptions, trace
@@ -34,7 +36,8 @@ class Determined(Polynomial):
 
     def advance(self, z, p, dp, row, corner, defect):
         out = super().advance(z, p, dp, row, corner, defect)
-        return replace(out, determinant=np.linalg.det(self.second(z, p)[:, :, : self.size]))
+        found = np.linalg.det(self.second(z, p)[:, :, : self.size])
+        return replace(out, determinant=np.stack([found, np.zeros_like(found)], axis=1))
 
 
 @QUICK
@@ -244,3 +247,65 @@ def test_a_determinant_is_looked_at_where_its_parabola_has_a_low_bottom_inside(s
     values = size * np.array([*seen, *unseen]).T
     assert may_vanish(values).tolist() == [True] * 3 + [False] * 3
     assert may_vanish(-values).tolist() == [True] * 3 + [False] * 3
+
+
+# --- determinants beyond the range of numbers ----------------------------------------------------
+THRUST = {
+    "P": em.PointForce(1.0, (-1.0, 0.0, 0.0)),
+    "w": em.LineLoad(direction=(-1.0, 0.0, 0.0)),
+}
+HEAVY = 0.2
+"""Weight of a column around which loads are varied, in units of 4π²B/L²."""
+
+
+def buckling_thrust(weight):
+    """Least P at which θ″ + 4π² (P + w (1 − s)) θ = 0, θ(0) = 0 = θ′(1): by Airy's functions."""
+
+    def determinant(thrust):
+        scale = np.cbrt(4.0 * np.pi**2 * weight)
+        foot, tip = (-4.0 * np.pi**2 * (thrust + weight * x) / scale**2 for x in (1.0, 0.0))
+        (a, _, b, _), (_, slope_a, _, slope_b) = airy(foot), airy(tip)
+        return slope_a * b - slope_b * a
+
+    thrusts = 0.0625 - 0.33 * weight + np.linspace(-0.4, 0.4, 401) * (0.1 + abs(weight))
+    signs = np.sign([determinant(thrust) for thrust in thrusts])
+    first = np.flatnonzero(signs[1:] != signs[:-1])[0]
+    return brentq(determinant, thrusts[first], thrusts[first + 1], xtol=1e-15)
+
+
+def column(kind, elements):
+    """A column, clamped below, under thrust at its top and its weight."""
+    options = {"ends": ("clamped", "free"), "elements": elements}
+    if kind == "space":
+        return em.SpatialRod(torsion=0.77, lateral=3.0, loads=THRUST, **options)
+    loads = {"P": em.PointForce(1.0, (-1.0, 0.0)), "w": em.LineLoad(direction=(-1.0, 0.0))}
+    return em.Rod(loads=loads, **options)
+
+
+@pytest.mark.parametrize(
+    ("kind", "elements"), [("space", 12), ("space", 60), ("plane", 12), ("plane", 60)]
+)
+def test_a_pair_of_buckling_loads_inside_a_step_is_found_however_many_the_elements(kind, elements):
+    """Chords of the convex region in which a column stands: the index is 1 but between two loads.
+
+    Half widths from 3 % to a third of the largest step; with 60 elements determinants are beyond
+    the range of numbers. 1e-7: elements of degree 6, and as searches for events end.
+    """
+    rod, generator = column(kind, elements), np.random.default_rng(8)
+    state = rod.natural_state()
+    thrust, weight = ([each.name for each in rod.parameters].index(name) for name in "Pw")
+    half, ways = 10.0 ** generator.uniform(-2.5, -1.0, 12), generator.uniform(0.3, 1.2, (2, 12))
+    start, velocity = state.p + np.zeros((12, 1)), np.zeros((12, len(state.p)))
+    ends = HEAVY - half, HEAVY + half
+    low, high = (np.array([buckling_thrust(w) for w in end]) for end in ends)
+    steep = (high - low) / (2.0 * half)
+    start[:, weight], start[:, thrust] = ends[0] - ways[0], low - steep * ways[0]
+    velocity[:, weight] = 2.0 * half + ways.sum(axis=0)
+    velocity[:, thrust] = steep * velocity[:, weight]
+    wanted = np.stack([ways[0], ways[0] + 2.0 * half], axis=1) / velocity[:, weight, None]
+    curve, z = ParameterLine(rod, start, velocity), np.repeat(state.z[None], 12, axis=0)
+    through = TraceOptions(through_folds=True, through_branch_points=True, record=False)
+    passed = trace(curve, z, options=through).passed
+    order = np.lexsort((passed.t, passed.lanes))
+    assert passed.lanes[order].tolist() == np.arange(12).repeat(2).tolist()
+    assert passed.t[order].reshape(12, 2) == pytest.approx(wanted, abs=1e-7)

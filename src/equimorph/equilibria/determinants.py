@@ -5,10 +5,11 @@ It costs one factorisation, and says where an eigenvalue has to be looked at; se
 
 import numpy as np
 
-from equimorph.arrays import Bool, Float, Lanes, Parameters, Some
+from equimorph.arrays import Bool, Determinants, Float, Lanes, Parameters, Some
 from equimorph.equilibria.curves import Curve, ParameterLine
 from equimorph.equilibria.locate import hermite
 from equimorph.equilibria.steps import Bracket
+from equimorph.linalg.determinants import in_units
 from equimorph.marching.kernels import EARLY_DIP, EARLY_NEAR
 from equimorph.structures import Structure
 
@@ -21,12 +22,12 @@ LOOKS, APART, NEARLY_ZERO = 4, 0.05, 1e-3
 computed, as a share; value, relative to the smaller one at the ends, that counts as zero."""
 
 
-def determinants(structure: Structure, z: Lanes, p: Parameters) -> Values:
-    """Determinant of F_z at some states, nan where it costs more than the solution."""
+def determinants(structure: Structure, z: Lanes, p: Parameters) -> Determinants:
+    """Determinant of F_z at some states, m nan where it costs more than the solution."""
     return determinant(ParameterLine(structure, p, np.zeros_like(p)), z, np.zeros(len(z)))
 
 
-def determinant(curve: Curve, z: Lanes, t: Values) -> Values:
+def determinant(curve: Curve, z: Lanes, t: Values) -> Determinants:
     """Determinant of F_z."""
     still, one, none = np.zeros_like(z), np.ones(len(z)), np.zeros(len(z))
     return curve.advance(np.ascontiguousarray(z), t, still, one, none).determinant
@@ -35,7 +36,6 @@ def determinant(curve: Curve, z: Lanes, t: Values) -> Values:
 def may_vanish(values: Float[np.ndarray, "3 steps"]) -> Bool[np.ndarray, " steps"]:
     """Whether what has such values at start, middle and end may touch zero or cross it twice."""
     start, middle, end = np.sign(values[0]) * values
-    # determinants of structures with hundreds of unknowns in space overflow: nothing is known then
     with np.errstate(divide="ignore", invalid="ignore"):
         bow, slope = start + end - 2.0 * middle, end - start
         least = middle - slope * (slope / (8.0 * bow))  # a determinant's square may overflow
@@ -51,12 +51,14 @@ def hides_two_zeros(curve: Curve, step: Bracket) -> Bool[np.ndarray, " steps"]:
     counts, too.
     """
     count = len(step.lanes)
-    ends = [determinant(curve, front.z, front.t) for front in (step.before, step.after)]
+    pair = [determinant(curve, front.z, front.t) for front in (step.before, step.after)]
+    unit = pair[0][:, 1]
+    ends = [in_units(each, unit) for each in pair]
     size = np.minimum(*np.abs(ends))
 
     def value(lanes: Some, share: Values) -> Values:
         at = determinant(curve.take(lanes), *hermite(step.take(lanes), share))
-        return np.asarray(np.sign(ends[0][lanes]) * at / size[lanes])
+        return np.asarray(np.sign(ends[0][lanes]) * in_units(at, unit[lanes]) / size[lanes])
 
     with np.errstate(divide="ignore", invalid="ignore"):
         middle = value(np.arange(count), np.full(count, 0.5))

@@ -19,6 +19,7 @@ from equimorph.equilibria.events import Events, locate_all
 from equimorph.equilibria.locate import hermite
 from equimorph.equilibria.steps import Bracket, Front, least_inside, step_along
 from equimorph.equilibria.trace_options import EventCode, TraceOptions
+from equimorph.linalg.determinants import in_units
 
 Values = Float[np.ndarray, " points"]
 CLOSE = 0.1
@@ -101,7 +102,8 @@ def inside_only_steps(curve: Curve, bracket: Bracket, options: TraceOptions) -> 
     here, old, new = curve.take(step.lanes), step.before, step.after
     middle = hermite(step, np.full(len(step.lanes), 0.5))
     places = ((old.z, old.t), middle, (new.z, new.t))
-    some = np.flatnonzero(may_vanish(np.stack([determinant(here, *at) for at in places])))
+    values = np.stack([determinant(here, *at) for at in places])
+    some = np.flatnonzero(may_vanish(in_units(values, values[0, :, 1])))
     step, unknown = step.take(some), np.full(len(some), np.nan)
     span = Span(step.lanes, step.before, step.after, np.zeros(len(some)), step.step, unknown)
     return [inside_spans(curve, span, options)]

@@ -14,6 +14,7 @@ from equimorph.equilibria.curves import PlainCurve
 from equimorph.equilibria.point_conditions import Linear, Move, Values as DescriptorValues
 from equimorph.errors import InputError
 from equimorph.linalg import BorderedSolution
+from equimorph.linalg.determinants import no_determinants
 from equimorph.model import Descriptor
 from equimorph.structures import Advance, Structure
 from equimorph.tolerances import METRIC_DIFFERENCE
@@ -287,7 +288,7 @@ class TrackedCurve:
             tangent[:, -1].copy(),
             np.abs(np.concatenate([residual, missed], axis=1)).max(axis=1),
             solved.negative - structure.constraints,
-            np.full(len(z), np.nan),
+            no_determinants(len(z)),
         )
 
     def _linear(

@@ -253,8 +253,8 @@ class Workspace:
 
     def __init__(self, rows: int, size: int, parameters: int, constraints: int) -> None:
         dz, tangent, there = np.empty((3, rows, size))
-        dt, slope, residual, determinant, self._ratio = np.empty((5, rows))
-        index, at = np.empty((2, rows), np.int64)
+        dt, slope, residual, self._ratio = np.empty((4, rows))
+        determinant, (index, at) = np.empty((rows, 2)), np.empty((2, rows), np.int64)
         p, dp, p_there = np.empty((3, rows, parameters))
         self.move = Advance(dz, dt, tangent, slope, residual, index, determinant)
         self.columns = (dz, dt, tangent, slope, residual, index, determinant, self._ratio)

@@ -14,6 +14,7 @@ from equimorph.linalg.condensed_kernels import (
     restore_element,
     start_block,
     work_arrays,
+    write_determinant,
 )
 from equimorph.linalg.kernels import (
     FLAGS,
@@ -31,8 +32,9 @@ START, SIDES = np.int64(0), np.int64(2)
 
 @njit(**FLAGS)
 def solve_condensed(
-    stiffness, ends, diagonal, border, columns, rows, corner, rhs, trailing, x, negative, ratio
-):
+    stiffness, ends, diagonal, border, columns, rows, corner, rhs, trailing,
+    x, negative, ratio, determinant,
+):  # fmt: skip
     """Bordered solves ``[H B C; Bᵀ T …; R … D] x = rhs`` for lanes-first arrays; see `condensed`.
 
     diagonal (lanes, nodes); border (lanes, m, nodes); columns (lanes, k, n + m) and rows alike;
@@ -73,10 +75,11 @@ def solve_condensed(
             at = start + lane
             _set_small(columns[at], rows[at], corner[at], rhs[at], trailing[at], lane, small)
         subtract_products(products, tiles, size, width, small)
-        count_border(small, m, width, square, extremes)
+        close_border(small, m, width, square, extremes)
         for lane in range(LANES):
             negative[start + lane] = np.int64(extremes[0, lane])
             ratio[start + lane] = pivot_ratio(extremes, lane)
+            write_determinant(extremes, lane, determinant, start + lane)
         if r > 0:
             solve_lanes(small, size, width)
         for c in range(0, r, 2):
@@ -193,16 +196,23 @@ def subtract_products(products, tiles, size, width, small):
 
 
 @njit(**INNER)
-def count_border(small, m, width, square, extremes):
-    """Add the negative eigenvalues of the first m rows and columns to the count of pivots."""
+def close_border(small, m, width, square, extremes):
+    """Add the negative eigenvalues of the first m rows and columns to the count of pivots.
+
+    The product of the reciprocal pivots becomes the determinant.
+    """
     if m == 2:
         store(extremes, 0, load(extremes, 0) + negative_of_two(small, 0, width))
+        across = load(small, 1) * load(small, width)
+        store(extremes, 4, (load(small, 0) * load(small, width + 1) - across) / load(extremes, 4))
         return
     for lane in range(LANES):
         for a in range(m):
             for b in range(m):
                 square[a, b] = small[a * width + b, lane]
-        extremes[0, lane] += factor_symmetric(square)[0]
+        negative, product = factor_symmetric(square)
+        extremes[0, lane] += negative
+        extremes[4, lane] = product / extremes[4, lane]
 
 
 @njit(**INNER)

@@ -5,10 +5,11 @@ from functools import cached_property
 
 import numpy as np
 
-from equimorph.arrays import Flags, Float, Int, Numbers, Values
+from equimorph.arrays import Determinants, Flags, Float, Int, Numbers, Values
 from equimorph.errors import InputError
 from equimorph.linalg.bordered_kernels import solve_condensed
 from equimorph.linalg.dense import BorderedSolution, solve_bordered
+from equimorph.linalg.determinants import clear_overflows
 from equimorph.linalg.lanes import over_lanes
 
 PIVOT_GUARD = 1e-8
@@ -106,8 +107,8 @@ class CondensedLayout:
         given = (diagonal, border, columns, rows, corner, rhs, trailing)
         self._check(*given)
         arrays = [np.ascontiguousarray(a) for a in given]
-        x, negative, ratio = self._solve(*arrays)
-        pivoted, determinant = np.zeros(len(x), bool), np.full(len(x), np.nan)
+        x, negative, ratio, determinant = self._solve(*arrays)
+        pivoted = np.zeros(len(x), bool)
         if not ratio.min(initial=1.0) >= PIVOT_GUARD:
             doubtful = np.flatnonzero(~(ratio >= PIVOT_GUARD))
             refined = doubtful[ratio[doubtful] >= REFINABLE]
@@ -118,6 +119,7 @@ class CondensedLayout:
             again = solve_bordered(self.dense(full[0], full[1], full[6]), *full[2:6])
             x[pivoted], negative[pivoted] = again.x, again.negative
             determinant[pivoted] = again.determinant
+        clear_overflows(determinant)
         return BorderedSolution(x, negative, ratio, pivoted, determinant)
 
     def _check(self, *arrays: np.ndarray) -> None:
@@ -139,13 +141,14 @@ class CondensedLayout:
         Float[np.ndarray, "lanes sides bordered"],
         Numbers,
         Values,
+        Determinants,
     ]:
-        """Solutions, negative eigenvalues and pivot ratios by the condensed elimination."""
+        """Solutions, negative eigenvalues, pivot ratios, determinants by condensed elimination."""
         lanes = len(arrays[0])
-        x, ratio = np.empty(arrays[5].shape), np.empty(lanes)
-        negative = np.empty(lanes, dtype=np.int64)
-        over_lanes(solve_condensed, (self.stiffness, self.ends), arrays, [x, negative, ratio])
-        return x, negative, ratio
+        x, ratio, determinant = np.empty(arrays[5].shape), np.empty(lanes), np.empty((lanes, 2))
+        outputs = x, np.empty(lanes, dtype=np.int64), ratio, determinant
+        over_lanes(solve_condensed, (self.stiffness, self.ends), arrays, outputs)
+        return outputs
 
     def _refine(
         self, arrays: list[np.ndarray], x: Float[np.ndarray, "lanes sides bordered"]

@@ -15,7 +15,7 @@ complement of the vertices in their slots there.
 import numpy as np
 
 from equimorph.linalg.compiled import njit
-from equimorph.linalg.kernels import FLAGS, INNER
+from equimorph.linalg.kernels import FLAGS, INNER, balance
 from equimorph.linalg.simd import (
     absolute,
     load,
@@ -49,7 +49,7 @@ def work_arrays(elements, inner, tiles):
     columns = work_rows(tiles * (elements * (inner + 1) + 1) * TILE)
     columns[:] = 0.0
     lower, vertices = work_rows(groups * inner * inner * GROUP), work_rows(2 * (elements + 1))
-    return lower, vertices, columns, work_rows(5)
+    return lower, vertices, columns, work_rows(6)
 
 
 @njit(**INNER)
@@ -114,7 +114,10 @@ def _reduce_tile(lower, base, inner, columns, ties, first):
 
 @njit(**INNER)
 def _note_pivots(lower, base, inner, extremes):
-    """Count negative pivots of an element; note extremes, sum and product of the reciprocals."""
+    """Count negative pivots of an element; note extremes, sum and product of the reciprocals.
+
+    The product is m·2^e, with m in row 4 and e in row 5.
+    """
     count, small, large = load(extremes, 0), load(extremes, 1), load(extremes, 2)
     total, product = load(extremes, 3), load(extremes, 4)
     zero, one = spread(0.0), spread(1.0)
@@ -128,7 +131,9 @@ def _note_pivots(lower, base, inner, extremes):
     store(extremes, 1, small)
     store(extremes, 2, large)
     store(extremes, 3, total)
+    product, exponent = balance(product, load(extremes, 5))
     store(extremes, 4, product)
+    store(extremes, 5, exponent)
 
 
 @njit(**INNER)
@@ -158,6 +163,7 @@ def start_block(diagonal, vertices, extremes):
     store(extremes, 2, spread(0.0))
     store(extremes, 3, spread(0.0))
     store(extremes, 4, spread(1.0))
+    store(extremes, 5, spread(0.0))
     store(vertices, 0, load(diagonal, 0))
 
 
@@ -168,7 +174,7 @@ def reduce_group(stiffness, group, diagonal, ends, tiles, lower, vertices, colum
     stiffness (elements, degree + 1, degree + 1); diagonal (nodes, 8); ends: first and last vertex
     that is unknown; columns (tiles, nodes, TILE, 8), ties left to this function. Filled: lower
     (see `lower_row`); vertices (elements + 1, 2, 8), reciprocal pivot and factor to the next;
-    extremes (5, 8): see `_note_pivots`.
+    extremes (6, 8): see `_note_pivots`.
     """
     elements, degree = stiffness.shape[0], stiffness.shape[1] - 1
     inner, rows = degree - 1, columns.shape[0] // tiles
@@ -262,3 +268,9 @@ def pivot_ratio(extremes, lane):
     """Smallest over largest |pivot| of a lane; not a number if a pivot is not."""
     total = extremes[3, lane]
     return extremes[1, lane] / extremes[2, lane] if total == total else np.nan  # noqa: PLR0124
+
+
+@njit(**INNER)
+def write_determinant(extremes, lane, determinant, at):
+    """Write m and e of det = m·2^e, which the product of the reciprocal pivots has become."""
+    determinant[at, 0], determinant[at, 1] = extremes[4, lane], -extremes[5, lane]

@@ -4,8 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from equimorph.arrays import Flags, Float, Lanes, Numbers, Values
+from equimorph.arrays import Determinants, Flags, Float, Lanes, Numbers, Values
 from equimorph.linalg.dense_kernels import solve_dense
+from equimorph.linalg.determinants import clear_overflows
 from equimorph.linalg.kernels import multiply_lanes, orthonormal_lanes
 
 Border = tuple[
@@ -28,15 +29,15 @@ class BorderedSolution:
 
     x holds one solution per right-hand side; `negative` counts the negative eigenvalues of A;
     `pivot_ratio` is the smallest over the largest pivot (1 where pivoting made it irrelevant);
-    `pivoted` flags lanes that took the pivoted dense factorisation; `determinant` is that of A,
-    nan where it is not at hand or beyond the range of numbers.
+    `pivoted` flags lanes that took the pivoted dense factorisation; `determinant` is that of A
+    as m and e of m·2^e, m nan where it is not at hand.
     """
 
     x: Float[np.ndarray, "lanes sides bordered"]
     negative: Numbers
     pivot_ratio: Values
     pivoted: Flags
-    determinant: Values
+    determinant: Determinants
 
 
 def multiply(x: Lanes, matrix: Float[np.ndarray, "size ..."]) -> Float[np.ndarray, "lanes ..."]:
@@ -97,9 +98,10 @@ def solve_bordered(
     full[:, n:, n : n + k] = corner
     full[:, :, n + k :] = rhs.transpose(0, 2, 1)
     whole = np.isfinite(full[:, :n, :n]).all(axis=(1, 2))
-    x, determinant = np.empty(rhs.shape), np.empty(lanes)
+    x, determinant = np.empty(rhs.shape), np.empty((lanes, 2))
     negative = np.empty(lanes, dtype=np.int64)
     solve_dense(full, n + k, np.array(matrix, order="C"), x, negative, determinant)
     negative[~whole] = -1
-    determinant[~(whole & np.isfinite(determinant))] = np.nan
+    determinant[~whole] = np.nan
+    clear_overflows(determinant)
     return BorderedSolution(x, negative, np.ones(lanes), np.ones(lanes, bool), determinant)

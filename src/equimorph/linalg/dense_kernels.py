@@ -3,7 +3,7 @@
 import numpy as np
 
 from equimorph.linalg.compiled import njit
-from equimorph.linalg.kernels import FLAGS, INNER, exchange
+from equimorph.linalg.kernels import FLAGS, INNER, balance_one, exchange
 
 
 @njit(**FLAGS)
@@ -13,7 +13,8 @@ def solve_dense(systems, size, symmetric, x, negative, determinant):
     systems: (lanes, size, size + sides), right-hand sides last; overwritten, like the matrices.
     """
     for lane in range(systems.shape[0]):
-        negative[lane], determinant[lane] = _factor_by_rooks(symmetric[lane])
+        negative[lane], product, exponent = _factor_by_rooks(symmetric[lane])
+        determinant[lane, 0], determinant[lane, 1] = product, exponent
         solve_by_rows(systems[lane], size)
         for side in range(x.shape[1]):
             for i in range(size):
@@ -58,21 +59,21 @@ def solve_by_rows(a, size):
 
 @njit(**INNER)
 def _factor_by_rooks(a):
-    """Negative eigenvalues of a symmetric matrix, and det, by LDLᵀ with rook pivoting.
+    """Negative eigenvalues of a symmetric matrix, and m, e of det = m·2^e, by LDLᵀ.
 
-    Ashcraft, Grimes and Lewis (1998): 1 × 1 and 2 × 2 pivots, the largest of their rows; `a` is
-    overwritten. Sylvester's law of inertia gives the signs: a 2 × 2 pivot chosen by this rule
-    always has one negative eigenvalue. −1 and nan where entries are not finite.
+    Rook pivoting of Ashcraft, Grimes and Lewis (1998): 1 × 1 and 2 × 2 pivots, the largest of
+    their rows; `a` is overwritten. Sylvester's law of inertia gives the signs: a 2 × 2 pivot chosen
+    by this rule always has one negative eigenvalue. −1 and nan where entries are not finite.
     """
     size = a.shape[0]
     alpha = 0.6403882032022076  # (1 + √17) / 8 bounds the growth of the entries
-    negative, k, product = 0, 0, 1.0
+    negative, k, product, exponent = 0, 0, 1.0, 0.0
     while k < size:
         first, second = k, k
         off, r = _largest_beside(a, k, k)
         single = abs(a[k, k]) >= alpha * off
         if not (single or off > 0.0):  # entries that are no numbers
-            return -1, np.nan
+            return -1, np.nan, 0.0
         while not single and first == second:
             other, s = _largest_beside(a, r, k)
             if abs(a[r, r]) >= alpha * other:
@@ -102,16 +103,18 @@ def _factor_by_rooks(a):
             p, q = a[k, k] / b, a[k + 1, k + 1] / b
             shape = p * q - 1.0
             if not shape < 0.0:
-                return -1, np.nan
+                return -1, np.nan, 0.0
             negative += 1
-            product *= shape * b * b
+            product, exponent = balance_one(product * b, exponent)
+            product *= shape * b
             for i in range(k + 2, size):
                 one = (q * a[i, k] - a[i, k + 1]) / (shape * b)
                 two = (p * a[i, k + 1] - a[i, k]) / (shape * b)
                 for j in range(k + 2, size):
                     a[i, j] -= one * a[k, j] + two * a[k + 1, j]
             k += 2
-    return negative, product
+        product, exponent = balance_one(product, exponent)
+    return negative, product, exponent
 
 
 @njit(**INNER)

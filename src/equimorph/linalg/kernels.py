@@ -22,6 +22,8 @@ INNER = {**FLAGS, "_nrt": False}
 They need not count references to their arrays: atomic operations that, element by element, cost as
 much as the arithmetic.
 """
+POWER, HUGE, TINY = 256.0, 2.0**256, 2.0**-256
+"""Products of pivots beyond 2^±256 are divided by a power of two, which is counted."""
 
 
 @njit(**INNER)
@@ -48,6 +50,26 @@ def solve_lanes(a, size, width):
             for j in range(size, width):
                 at = k * width + j
                 store(a, at, load(a, at) - factor * load(a, i * width + j))
+
+
+@njit(**INNER)
+def balance(product, exponent):
+    """Products and exponents of m·2^e, with m within 2^±256 unless it was beyond 2^±512."""
+    one, zero, size = spread(1.0), spread(0.0), absolute(product)
+    huge, tiny, power = spread(HUGE), spread(TINY), spread(POWER)
+    factor = where_less(huge, size, tiny, where_less(size, tiny, huge, one))
+    more = where_less(huge, size, power, where_less(size, tiny, zero - power, zero))
+    return product * factor, exponent + more
+
+
+@njit(**INNER)
+def balance_one(product, exponent):
+    """`balance` for one number."""
+    if abs(product) > HUGE:
+        return product * TINY, exponent + POWER
+    if abs(product) < TINY:
+        return product * HUGE, exponent - POWER
+    return product, exponent
 
 
 @njit(**FLAGS)

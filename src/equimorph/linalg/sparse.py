@@ -8,6 +8,7 @@ import numpy as np
 
 from equimorph.arrays import Float, Int
 from equimorph.linalg.dense import Border, BorderedSolution, no_border, solve_bordered
+from equimorph.linalg.determinants import clear_overflows
 from equimorph.linalg.lanes import over_lanes
 from equimorph.linalg.sparse_kernels import solve_sparse
 
@@ -108,7 +109,7 @@ class SparseLayout:
         lanes = len(values)
         around = no_border(lanes, self.size) if border is None else border
         arrays = [np.ascontiguousarray(a) for a in (values, *around, rhs)]
-        x, (growth, determinant) = np.empty(rhs.shape), np.empty((2, lanes))
+        x, growth, determinant = np.empty(rhs.shape), np.empty(lanes), np.empty((lanes, 2))
         negative = np.empty(lanes, dtype=np.int64)
         how = self.elimination
         shared = (how.start, how.rows, how.alike, how.target, how.scatter, how.order)
@@ -119,7 +120,7 @@ class SparseLayout:
             again = solve_bordered(self.dense(values[pivoted]), *(a[pivoted] for a in arrays[1:]))
             x[pivoted], negative[pivoted] = again.x, again.negative
             determinant[pivoted] = again.determinant
-        determinant[~np.isfinite(determinant)] = np.nan
+        clear_overflows(determinant)
         ratio = 1.0 / np.maximum(growth, 1.0)
         return BorderedSolution(x, negative, ratio, pivoted, determinant)
 

@@ -3,7 +3,14 @@
 import numpy as np
 
 from equimorph.linalg.compiled import njit
-from equimorph.linalg.kernels import FLAGS, INNER, read_lanes, solve_lanes, write_lanes
+from equimorph.linalg.kernels import (
+    FLAGS,
+    INNER,
+    balance,
+    read_lanes,
+    solve_lanes,
+    write_lanes,
+)
 from equimorph.linalg.simd import (
     LANES,
     absolute,
@@ -24,15 +31,15 @@ def eliminate(start, rows, alike, target, factors, columns):
     Columns with the same rows below follow each other: alike[0] counts those of a group after each;
     `target` has, from alike[1] on, the places that each pair of entries below the group updates.
     `columns` has room for the longest column. Returns
-    (number of negative pivots, largest change of a diagonal entry, product of the pivots).
+    (number of negative pivots, largest change of a diagonal entry, m, e of their product m·2^e).
     """
     size = len(start) - 1
     negative, growth = spread(0.0), spread(0.0)
     zero, one = spread(0.0), spread(1.0)
-    product = one
+    product, exponent = one, zero
     for k in range(size - 1):
         pivot = load(factors, k)
-        product = product * pivot
+        product, exponent = balance(product * pivot, exponent)
         negative = negative + where_less(pivot, zero, one, zero)
         inverse = one / pivot
         first, count = start[k], start[k + 1] - start[k]
@@ -51,7 +58,7 @@ def eliminate(start, rows, alike, target, factors, columns):
                 at = target[pair]
                 store(factors, at, load(factors, at) - factor * load(columns, j))
                 pair += 1
-    return negative, growth, product
+    return negative, growth, product, exponent
 
 
 @njit(**INNER)
@@ -128,7 +135,7 @@ def solve_sparse(
     for i in range(size):
         longest = max(longest, start[i + 1] - start[i])
     raw, factors = work_rows(max(entries, full)), work_rows(size + len(rows))
-    column, part = work_rows(longest + 1), work_rows(size * width)
+    column, part = work_rows(longest + 2), work_rows(size * width)
     tail = work_rows((k + 1) * across)
     for block in range(0, lanes, LANES):
         lane = min(block, lanes - LANES)
@@ -139,7 +146,8 @@ def solve_sparse(
             value = load(raw, e)
             store(factors, scatter[e], value)
             largest = larger(largest, absolute(value))
-        below, grown, product = eliminate(start, rows, alike, target, factors, column)
+        found = eliminate(start, rows, alike, target, factors, column)
+        below, grown, product, exponent = found
         one, zero = spread(1.0), spread(0.0)
         below = below + where_less(load(factors, size - 1), zero, one, zero)
         store(column, 0, below)
@@ -149,8 +157,9 @@ def solve_sparse(
         for i in range(LANES):
             growth[lane + i] = column[0, i]
         store(column, 0, product * load(factors, size - 1))
+        store(column, 1, exponent)
         for i in range(LANES):
-            determinant[lane + i] = column[0, i]
+            determinant[lane + i, 0], determinant[lane + i, 1] = column[0, i], column[1, i]
         if sides == 0:
             continue
         for c in range(k):

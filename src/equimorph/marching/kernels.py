@@ -6,6 +6,8 @@ far as it gets without another Newton step of the structure. Scalars of the lane
 the same, bit for bit, whichever lanes march beside it.
 """
 
+from math import ldexp
+
 import numpy as np
 
 from equimorph.linalg.compiled import njit
@@ -21,15 +23,15 @@ INLINE = {**SUMS, "forceinline": True}
 (
     T, SLOPE, T_1, SLOPE_1, T_2, SLOPE_2, X_1, RATE_1, X_2, RATE_2, ARC, TRIAL, CORNER, DEFECT,
     LENGTH, TRAVELLED, LAST, WEIGHT, LARGEST, TURNING, NEW_SLOPE, NORM, TURN, DET_OLD, DET, NEW_DET,
-    GAIN, BEND,
-) = range(28)  # fmt: skip
+    GAIN, BEND, UNIT,
+) = range(29)  # fmt: skip
 """Rows of `numbers`: t and dt/ds here, one step before and two; where those two lie along the
 tangent here, and the cosines of theirs; arclength of the step before; t, closing equation and
 length of the step that is tried; way so far; last correction; squared weight of dt; knobs; dt/ds at
 the end, length of the tangent and turning angle of a step that converged; determinant of F_z at the
 step before, here and at the end; last correction over the square of the one before; turning angle
-per length of the last step."""
-NUMBERS = 28
+per length of the last step; power of two in which all determinants of the lane are measured."""
+NUMBERS = 29
 
 LANE, STAGE, ITERATION, INDEX, NEW_INDEX, WHAT, STEPS, MOST, LEVEL, HEAD, KNOWN = range(11)
 """Rows of `counts`: number of the lane; stage; Newton steps so far; index here and at the end of
@@ -236,7 +238,7 @@ def judge(index, determinant, numbers, counts, active, smallest, locates, plain)
     for i in range(active):
         if counts[STAGE, i] != CONVERGED:
             continue
-        counts[NEW_INDEX, i], numbers[NEW_DET, i] = index[i], determinant[i]
+        counts[NEW_INDEX, i], numbers[NEW_DET, i] = index[i], _in_units(i, determinant, numbers)
         old, new, length = numbers[SLOPE, i], numbers[NEW_SLOPE, i], numbers[LENGTH, i]
         start, end = numbers[T, i], numbers[TRIAL, i]
         flipped = np.sign(new) != np.sign(old)
@@ -246,7 +248,7 @@ def judge(index, determinant, numbers, counts, active, smallest, locates, plain)
             counts[ITERATION, i] += 1
             continue
         # a pair of eigenvalues that is always one by symmetry counts once in the determinant
-        if changed == 2 and determinant[i] * numbers[DET, i] < 0.0:
+        if changed == 2 and determinant[i, 0] * numbers[DET, i] < 0.0:
             changed = 1
         # at a fold the path turns and the index changes; at a branch point one without the other
         fold = flipped and (changed == 1 or not plain)
@@ -276,6 +278,13 @@ def judge(index, determinant, numbers, counts, active, smallest, locates, plain)
             close += (counts[WHAT, i] & HIDDEN) == 0
             counts[WHAT, i] |= EARLY
     return good, doubtful, close
+
+
+@njit(**INLINE)
+def _in_units(i, determinant, numbers):
+    """Determinant m·2^e over the power of two of that at the start of the lane."""
+    power = determinant[i, 1] - numbers[UNIT, i]
+    return determinant[i, 0] if power == 0.0 else ldexp(determinant[i, 0], int(power))
 
 
 @njit(**INLINE)

@@ -52,6 +52,7 @@ from equimorph.marching.kernels import (
     TRIAL,
     TURN,
     TURNING,
+    UNIT,
     WEIGHT,
     X_1,
     X_2,
@@ -285,7 +286,8 @@ def _start(i, move, mass, knobs, places, numbers, counts):
         z_here[i, 0, j] = trial[i, j] + dz[i, j]
     for j in range(size):
         tangent_here[i, 0, j] = tangent[i, j] * norm
-    numbers[SLOPE, i], numbers[DET, i] = slope[i] * norm, determinant[i]
+    numbers[SLOPE, i] = slope[i] * norm
+    numbers[DET, i], numbers[UNIT, i] = determinant[i, 0], determinant[i, 1]
     numbers[LENGTH, i], numbers[LARGEST, i] = knobs[0, level], knobs[1, level]
     numbers[TURNING, i], counts[MOST, i] = knobs[2, level], int(knobs[3, level])
     counts[INDEX, i] = index[i]

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from equimorph.arrays import Float, Int, Lanes, Parameters, Sides, Values
+from equimorph.arrays import Determinants, Float, Int, Lanes, Parameters, Sides, Values
 from equimorph.linalg import Border, BorderedSolution
 from equimorph.linalg.intervals import Interval
 
@@ -22,7 +22,7 @@ class Advance:
     The bordered system is ``[F_z F_t; row corner] [dz; dt] = −[F; defect]`` with
     ``F_t = F_p·dp``; the tangent solves it for the right-hand side ``[0; 1]``.
 
-    determinant: that of F_z where it costs nothing, else nan.
+    determinant: that of F_z as m and e of m·2^e where it costs nothing, else m is nan.
     """
 
     dz: Lanes
@@ -31,7 +31,7 @@ class Advance:
     tangent_t: Values
     residual: Values
     index: Int[np.ndarray, " lanes"]
-    determinant: Values
+    determinant: Determinants
 
 
 @dataclass(frozen=True)

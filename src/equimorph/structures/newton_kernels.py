@@ -126,7 +126,7 @@ def newton_of(step):
         one, index = np.ones(rows), np.empty(rows, np.int64)
         dz, tangent_z = np.empty((rows, size)), np.empty((rows, size))
         dt, tangent_t, residual = np.empty(rows), np.empty(rows), np.empty(rows)
-        determinant, ratio = np.empty(rows), np.empty(rows)
+        determinant, ratio = np.empty((rows, 2)), np.empty(rows)
         while left > 0 and number < most:
             m = max(left, LANES)
             step(

@@ -18,6 +18,7 @@ from equimorph.arrays import Cells, Float, ItemValues
 from equimorph.columns import Columns
 from equimorph.equilibria.determinants import determinants
 from equimorph.equilibria.settle import Guards, free_directions, settle
+from equimorph.linalg.determinants import in_units
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.manifold.geometry.points import are_singular
 from equimorph.manifold.geometry.quadratics import least_in_simplex, through_corners
@@ -48,11 +49,12 @@ Shares = Float[np.ndarray, "n corners"]
 class _Patches(Columns):
     """Simplices on a set: states at their corners, and then at other points nearby.
 
-    unit: the determinant at the first corner of the cell that they lie on; determinants: over that,
-    since those of large structures reach 1e107; deep: value below which they dip.
+    unit, power: the determinant unit·2^power at the first corner of the cell that they lie on;
+    determinants: over that; deep: value below which they dip.
     """
 
     unit: ItemValues
+    power: ItemValues
     deep: ItemValues
     z: Float[np.ndarray, "n points size"]
     p: Float[np.ndarray, "n points parameters"]
@@ -86,20 +88,21 @@ def hidden_islands(eset: EquilibriumSet) -> States:
 def _of_cells(eset: EquilibriumSet) -> _Patches:
     """Cells with the vertices across their sides, off folds and crossings, where much varies."""
     vertices, singular = eset.points, are_singular(eset.kinds)
-    known = np.zeros(len(singular))
+    known = np.zeros((len(singular), 2))
     known[~singular] = determinants(eset.structure, vertices.z[~singular], vertices.p[~singular])
-    known[~np.isfinite(known)] = np.nan
     plain = np.flatnonzero(~singular[eset.cells].any(axis=1))
     around = np.concatenate([eset.cells, _across(eset.cells)], axis=1)[plain]
-    values = np.where(around == NOWHERE, np.nan, known[around])
-    unit = values[:, 0].copy()
+    unit, power = known[around[:, 0]].T
+    values = np.where(around == NOWHERE, np.nan, in_units(known[around], power[:, None]))
+    values[~np.isfinite(values)] = np.nan
     values *= np.sign(unit)[:, None]
     low = values[:, : eset.cells.shape[1]].min(axis=1)
     varying = np.flatnonzero(np.fmax.reduce(values, axis=1) > VARYING * low)
-    unit, low, around, values = (each[varying] for each in (unit, low, around, values))
+    of_cells = unit, power, low, around, values
+    unit, power, low, around, values = (each[varying] for each in of_cells)
     size = np.abs(unit)
     deep, values = DEEP * low / size, values / size[:, None]
-    return _Patches(unit, deep, vertices.z[around], vertices.p[around], values)
+    return _Patches(unit, power, deep, vertices.z[around], vertices.p[around], values)
 
 
 def _across(cells: Cells) -> Cells:
@@ -159,10 +162,12 @@ def _inside(
     directions = free_directions(structure, setting.free, len(z))
     guards = Guards(iterations=ITERATIONS)
     found = settle(structure, z, p, directions, guards=guards, frames=False)
-    values = determinants(structure, found.z, found.p) / np.repeat(patches.unit, points)
+    values = in_units(determinants(structure, found.z, found.p), np.repeat(patches.power, points))
+    values /= np.repeat(patches.unit, points)
     values[~found.found | ~np.isfinite(values)] = np.nan
     return _Patches(
         patches.unit,
+        patches.power,
         patches.deep,
         found.z.reshape(n, points, -1),
         found.p.reshape(n, points, -1),

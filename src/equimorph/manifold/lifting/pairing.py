@@ -13,6 +13,7 @@ import numpy as np
 from equimorph.arrays import Float, Int, ItemFlags, Items
 from equimorph.columns import Columns
 from equimorph.equilibria import ParameterLine
+from equimorph.linalg.determinants import in_units
 from equimorph.manifold.complex.base_mesh import BaseMesh
 from equimorph.manifold.geometry.points import Points, VertexKind
 from equimorph.manifold.geometry.setting import Setting
@@ -31,13 +32,15 @@ class Slopes:
     Computed once, when it is first asked for; the Newton step that comes with them is the last one
     of the point. Points that lie over no grid vertex have none.
 
-    tangents: changes of z for unit changes of the parameters; index: `NONE` where there are none.
+    tangents: changes of z for unit changes of the parameters; index: `NONE` where there are none;
+    unit: power of two in which determinants are measured, that of most of the first.
     """
 
     tangents: Float[np.ndarray, "capacity d size"]
     index: Int[np.ndarray, " capacity"]
     determinant: Float[np.ndarray, " capacity"]
     count: int = 0
+    unit: float | None = None
 
     @classmethod
     def empty(cls, setting: Setting) -> "Slopes":
@@ -64,7 +67,10 @@ class Slopes:
             out = setting.structure.advance(z, p, along, still, one, none)
             self.tangents[new, k] = out.tangent_z
             if k == 0:  # and one more step of Newton's method
-                self.index[new], self.determinant[new] = out.index, out.determinant
+                if self.unit is None:
+                    self.unit = float(np.median(out.determinant[:, 1]))
+                self.index[new] = out.index
+                self.determinant[new] = in_units(out.determinant, self.unit)
                 largest = np.abs(out.dz).max(axis=1)
                 near = (largest > LAST[0]) & (largest < LAST[1])
                 points.z[new[near]] += out.dz[near]

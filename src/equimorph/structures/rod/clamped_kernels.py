@@ -18,6 +18,7 @@ from equimorph.linalg.condensed_kernels import (
     restore_element,
     start_block,
     work_arrays,
+    write_determinant,
 )
 from equimorph.linalg.kernels import FLAGS, INNER, read_lanes, solve_lanes, write_lanes
 from equimorph.linalg.simd import (
@@ -330,4 +331,5 @@ def advance_in(
             at = start + k
             dt[at], tangent_t[at] = small[13, k], small[14, k]
             residual[at], index[at] = sums[WORST, k], np.int64(extremes[0, k]) - 2
-            determinant[at], ratio[at] = extremes[4, k], pivot_ratio(extremes, k)
+            write_determinant(extremes, k, determinant, at)
+            ratio[at] = pivot_ratio(extremes, k)

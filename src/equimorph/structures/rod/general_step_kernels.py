@@ -3,7 +3,7 @@
 import numpy as np
 
 from equimorph.linalg.bordered_kernels import (
-    count_border,
+    close_border,
     reduce_block,
     restore_pair,
     row_of_column,
@@ -11,7 +11,7 @@ from equimorph.linalg.bordered_kernels import (
     tiles_of,
 )
 from equimorph.linalg.compiled import njit
-from equimorph.linalg.condensed_kernels import TILE, pivot_ratio, work_arrays
+from equimorph.linalg.condensed_kernels import TILE, pivot_ratio, work_arrays, write_determinant
 from equimorph.linalg.kernels import FLAGS, INNER, read_lanes, solve_lanes, write_lanes
 from equimorph.linalg.simd import LANES, absolute, load, spread, store, where_less, work_rows
 from equimorph.structures.rod.general_kernels import assemble_block
@@ -66,16 +66,6 @@ def _largest(force, closure, first, n, m):
     return worst + (total - total)
 
 
-@njit(**INNER)
-def _determinant(small, m, width):
-    """Determinant of the first m ≤ 2 rows and columns of the small system."""
-    if m == 0:
-        return spread(1.0)
-    if m == 1:
-        return load(small, 0)
-    return load(small, 0) * load(small, width + 1) - load(small, 1) * load(small, width)
-
-
 @njit(**FLAGS)
 def advance_lanes(
     ends, stiffness, points, softness, slope, picks, splits, quadratic, turned, first,
@@ -118,8 +108,7 @@ def advance_lanes(
         )  # fmt: skip
         _fill_small(m, closure, moved, trailing, row, corner, defect, start, n, small)
         subtract_products(products, tiles, border, width, small)
-        count_border(small, m, width, square, extremes)
-        store(extremes, 4, _determinant(small, m, width) / load(extremes, 4))
+        close_border(small, m, width, square, extremes)
         solve_lanes(small, border, width)
         restore_pair(stiffness, ends, border, width, 0, 1, lower, vertices, work, small, solution)
         for c in range(m):
@@ -131,4 +120,5 @@ def advance_lanes(
             at = start + k
             dt[at], tangent_t[at] = small[m * width + border, k], small[m * width + border + 1, k]
             residual[at], index[at] = worst[0, k], np.int64(extremes[0, k]) - m
-            determinant[at], ratio[at] = extremes[4, k], pivot_ratio(extremes, k)
+            write_determinant(extremes, k, determinant, at)
+            ratio[at] = pivot_ratio(extremes, k)

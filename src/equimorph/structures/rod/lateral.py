@@ -11,6 +11,7 @@ from equimorph.arrays import Bool, Float, Int, Lanes, Parameters, Values
 from equimorph.errors import InputError
 from equimorph.linalg import Border, BorderedSolution, no_border, solve_bordered
 from equimorph.linalg.condensed import REFINABLE
+from equimorph.linalg.determinants import no_determinants
 from equimorph.linalg.lanes import over_lanes
 from equimorph.structures.margin import stability_margin
 from equimorph.structures.rod.discretisation import Mesh
@@ -235,7 +236,7 @@ class OutOfPlane:
         if unsafe.any():
             again = self._solve_in_full(z[unsafe], p[unsafe], rhs[unsafe], moved[unsafe])
             x[unsafe], negative[unsafe] = again.x, again.negative
-        return BorderedSolution(x, negative, ratio, unsafe, np.full(len(z), np.nan))
+        return BorderedSolution(x, negative, ratio, unsafe, no_determinants(len(z)))
 
     def index(self, z: Lanes, p: Parameters) -> Int[np.ndarray, " lanes"]:
         """Number of independent movements out of the plane that lower the energy."""

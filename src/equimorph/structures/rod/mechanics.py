@@ -123,11 +123,11 @@ class RodMechanics(Equations):
         inputs = [np.ascontiguousarray(each) for each in (z, *more)]
         # one block each: memory that is released at once stays with the process, without new pages
         dz, tangent_z = np.empty((2, *z.shape))
-        dt, tangent_t, residual, determinant, ratio = np.empty((5, lanes))
-        index = np.empty(lanes, dtype=np.int64)
+        dt, tangent_t, residual, ratio = np.empty((4, lanes))
+        index, determinant = np.empty(lanes, dtype=np.int64), np.empty((lanes, 2))
         outputs = (dz, dt, tangent_z, tangent_t, residual, index, determinant, ratio)
         over_lanes(kernel, shared, inputs, outputs)
-        determinant *= self.determinant_sign
+        determinant[:, 0] *= self.determinant_sign
         return Advance(*outputs[:-1]), ratio
 
     def pivot_steps(self, out: Advance, ratio: Values, *given: np.ndarray) -> Advance:

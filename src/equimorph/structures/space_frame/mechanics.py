@@ -8,6 +8,7 @@ import numpy as np
 from equimorph.arrays import Entries, Flags, Float, Int, Lanes, Parameters, Sides
 from equimorph.linalg import BorderedSolution
 from equimorph.linalg.dense import no_border
+from equimorph.linalg.determinants import clear_overflows
 from equimorph.linalg.lanes import over_lanes
 from equimorph.linalg.sparse import SparseLayout
 from equimorph.structures.discrete import linearise
@@ -266,14 +267,14 @@ class SpatialFrameMechanics(SpatialFrameLagrangian, JointEquations):
         given = [np.ascontiguousarray(each) for each in (*at, columns, rows, corner, rhs)]
         over_lanes(eliminate_lengths, self._of_lengths, given, small)
         found = self.layout.solve(entries, (small[0], small[1], small[2]), small[3])
-        x, negative, scale = np.empty(rhs.shape), np.empty(lanes, np.int64), np.empty(lanes)
+        x, negative, scale = np.empty(rhs.shape), np.empty(lanes, np.int64), np.empty((lanes, 2))
         given = [*given[:4], given[6], found.x]
         over_lanes(restore_lengths, self._of_lengths, given, [x, negative, scale])
-        with np.errstate(over="ignore", invalid="ignore"):
-            determinant = found.determinant * scale
-        determinant[~np.isfinite(determinant)] = np.nan
+        scale[:, 0] *= found.determinant[:, 0]
+        scale[:, 1] += found.determinant[:, 1]
+        clear_overflows(scale)
         negative += found.negative
-        return BorderedSolution(x, negative, found.pivot_ratio, found.pivoted, determinant)
+        return BorderedSolution(x, negative, found.pivot_ratio, found.pivoted, scale)
 
     @cached_property
     def _of_lengths(self) -> tuple[np.ndarray, np.ndarray]:

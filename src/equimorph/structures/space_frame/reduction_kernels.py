@@ -7,7 +7,7 @@ At a node with the quaternion q = ρ u, coordinates are ρ and rotations: the di
 import numpy as np
 
 from equimorph.linalg.compiled import njit
-from equimorph.linalg.kernels import FLAGS, INNER
+from equimorph.linalg.kernels import FLAGS, INNER, balance_one
 from equimorph.linalg.row_kernels import copy_row
 
 
@@ -89,18 +89,19 @@ def eliminate_lengths(
 def restore_lengths(
     lengths, masses, z, residual, shift, columns, rhs, solution, x, negative, scale
 ):
-    """Solutions by quaternions from those by rotations; negative pivots, factor of the det."""
+    """Solutions by quaternions from those by rotations; negative pivots, factor of det as m, e."""
     free, borders, sides = len(lengths), columns.shape[1], rhs.shape[1]
     size = z.shape[1]
     basis, mixed, part = np.empty((4, 4)), np.empty(3), np.empty(4)
     for lane in range(len(z)):
-        negative[lane], scale[lane] = 0, 1.0
+        negative[lane], product, exponent = 0, 1.0, 0.0
         for n in range(free):
             radius, pivot = _set_node(
                 lengths, masses, z[lane], residual[lane], shift[lane, 0], n, basis, mixed
             )
             negative[lane] += pivot < 0.0
-            scale[lane] *= pivot * (2.0 / radius) ** 6
+            product *= pivot * (2.0 / radius) ** 6
+            product, exponent = balance_one(product, exponent)
             for s in range(sides):
                 part[0] = _along(basis, 0, rhs[lane, s], 4 * n)
                 for k in range(3):
@@ -116,6 +117,7 @@ def restore_lengths(
                     for k in range(4):
                         total += basis[k, c] * part[k]
                     x[lane, s, 4 * n + c] = total
+        scale[lane, 0], scale[lane, 1] = product, exponent
         for s in range(sides):
             for i in range(4 * free, size + borders):
                 x[lane, s, i] = solution[lane, s, i - free]

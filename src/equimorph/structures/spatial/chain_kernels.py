@@ -6,7 +6,7 @@ Coordinates along which there is no closure have one of their own with a multipl
 import numpy as np
 
 from equimorph.linalg.compiled import njit
-from equimorph.linalg.kernels import INNER
+from equimorph.linalg.kernels import INNER, balance
 from equimorph.linalg.simd import (
     LANES,
     absolute,
@@ -22,6 +22,7 @@ from equimorph.structures.spatial.force_kernels import BORDER, COLUMN, FORCE, RO
 from equimorph.structures.spatial.node_kernels import (
     COUNT,
     EXCESS,
+    EXPONENT,
     INVERSE,
     LARGE,
     PRODUCT,
@@ -128,7 +129,10 @@ def spring_vertices(springs, start, shares, vertices):
 
 @njit(**INNER)
 def note_pivot(inverse, extremes):
-    """Count a negative pivot; note extremes, sum and product of the reciprocals."""
+    """Count a negative pivot; note extremes, sum and product of the reciprocals.
+
+    The product is balanced by `balance_pivots`, once an element.
+    """
     zero, one, size = spread(0.0), spread(1.0), absolute(inverse)
     count, small, large = load(extremes, COUNT), load(extremes, SMALL), load(extremes, LARGE)
     store(extremes, COUNT, count + where_less(inverse, zero, one, zero))
@@ -136,6 +140,14 @@ def note_pivot(inverse, extremes):
     store(extremes, LARGE, where_less(large, size, size, large))
     store(extremes, TOTAL, load(extremes, TOTAL) + inverse)
     store(extremes, PRODUCT, load(extremes, PRODUCT) * inverse)
+
+
+@njit(**INNER)
+def balance_pivots(extremes):
+    """Keep the product of the reciprocal pivots within the range of numbers."""
+    product, exponent = balance(load(extremes, PRODUCT), load(extremes, EXPONENT))
+    store(extremes, PRODUCT, product)
+    store(extremes, EXPONENT, exponent)
 
 
 @njit(**INNER)

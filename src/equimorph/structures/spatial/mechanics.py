@@ -264,12 +264,12 @@ class SpatialMechanics(SpatialLagrangian, JointEquations):
         lanes = len(z)
         lowered = np.zeros(lanes) if shift is None else shift * (2.0 / LENGTH_STIFFNESS)
         inputs = [np.ascontiguousarray(each) for each in (z, p, lowered, springs, *around, rhs)]
-        x, (determinant, ratio) = np.empty(rhs.shape), np.empty((2, lanes))
+        x, ratio, determinant = np.empty(rhs.shape), np.empty(lanes), np.empty((lanes, 2))
         negative = np.empty(lanes, dtype=np.int64)
         outputs = [x, negative, determinant, ratio]
         over_lanes(solve_bordered_lanes, self.step_tables, inputs, outputs)
         negative -= 3 - self.constraints
-        determinant *= self.determinant_sign
+        determinant[:, 0] *= self.determinant_sign
         return BorderedSolution(x, negative, ratio, ~(ratio >= PIVOT_GUARD), determinant)
 
     def pivot(

@@ -5,7 +5,7 @@ of its cross-section: δq = ρ q/r + ½ q φ. Lengths are eliminated at the node
 """
 
 from equimorph.linalg.compiled import njit
-from equimorph.linalg.kernels import INNER
+from equimorph.linalg.kernels import INNER, balance
 from equimorph.linalg.simd import (
     LANES,
     absolute,
@@ -28,8 +28,8 @@ RADIUS, INVERSE, EXCESS, SOFT, RADIAL = range(5)
 """Rows of a node: r, 1/r, c (r² − 1), 1/(c (3 r² − 1)), and the closing row along q."""
 RADII = 5
 """Their number."""
-COUNT, SMALL, LARGE, TOTAL, PRODUCT = range(5)
-"""Rows of the extremes, as of `pivot_ratio`: of the reciprocal pivots."""
+COUNT, SMALL, LARGE, TOTAL, PRODUCT, EXPONENT = range(6)
+"""Rows of the extremes, as of `pivot_ratio`: of the reciprocal pivots, whose product is m·2^e."""
 DEFECT, WORST, SUM = range(3)
 """Rows of the sums over nodes."""
 
@@ -93,7 +93,7 @@ def normalise(lengths, lowered, first, stop, q, row, radii, extremes, sums):
     lowered: one row, by how much a shift of the metric lowers r² in units of the stiffness.
     """
     zero, one, three, half = spread(0.0), spread(1.0), spread(3.0), spread(0.5)
-    count, product, defect = zero, one, zero
+    count, product, exponent, defect = zero, one, zero, zero
     for i in range(first, stop):
         at, c = 4 * i, spread(lengths[i])
         q0, q1, q2, q3 = load(q, at), load(q, at + 1), load(q, at + 2), load(q, at + 3)
@@ -109,6 +109,7 @@ def normalise(lengths, lowered, first, stop, q, row, radii, extremes, sums):
         soft, node = one / stiff, RADII * i
         count = count + where_less(stiff, zero, one, zero)
         product = product * (square * square * square * soft * spread(1.0 / 64.0))
+        product, exponent = balance(product, exponent)
         radial = turn_row(q, at, row, at, half * radius)
         store(radii, node + RADIUS, radius)
         store(radii, node + INVERSE, inverse)
@@ -119,6 +120,7 @@ def normalise(lengths, lowered, first, stop, q, row, radii, extremes, sums):
     store(sums, DEFECT, defect)
     store(extremes, COUNT, count)
     store(extremes, PRODUCT, product)
+    store(extremes, EXPONENT, exponent)
 
 
 @njit(**INNER)

@@ -210,11 +210,11 @@ class PinnedMechanics(SpatialMechanics):
         force = np.abs(z[:, -1]) * np.abs(own).max(axis=1)
         np.maximum(step.residual, np.maximum(np.abs(gap), force), out=step.residual)
         scale = np.divide(rate, 2.0 * springs[:, 1], out=np.ones(len(z)), where=rate != 0.0)
-        with np.errstate(over="ignore"):  # of rods with many elements
-            step.determinant[:] *= -(scale**2)
+        step.determinant[:, 0] *= -(scale**2)
         step = self.pivot_steps(step, ratio, z, p, dp, row, corner, defect)
         pairs = 1.0 - 2.0 * (step.index[void] // 2 % 2)
-        step.determinant[void] = pairs * np.sqrt(np.abs(step.determinant[void]))
+        step.determinant[void, 0] = pairs * np.sqrt(np.abs(step.determinant[void, 0]))
+        step.determinant[void, 1] /= 2.0
         return step
 
     def velocity(self, z: Lanes) -> Lanes:

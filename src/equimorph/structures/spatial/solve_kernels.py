@@ -8,7 +8,7 @@ into three by its rotation and one by the length of its quaternion.
 import numpy as np
 
 from equimorph.linalg.compiled import njit
-from equimorph.linalg.condensed_kernels import pivot_ratio
+from equimorph.linalg.condensed_kernels import pivot_ratio, write_determinant
 from equimorph.linalg.kernels import (
     FLAGS,
     INNER,
@@ -19,6 +19,7 @@ from equimorph.linalg.kernels import (
 )
 from equimorph.linalg.simd import LANES, load, load4, repeat4, spread, store, work_rows
 from equimorph.structures.spatial.chain_kernels import (
+    balance_pivots,
     close_system,
     eliminate_vertex,
     note_closures,
@@ -274,7 +275,7 @@ def solve_bordered_lanes(
     q, none, radii = work_rows(4 * nodes + 8), work_rows(4 * nodes + 8), work_rows(RADII * nodes)
     scalars, rates = work_rows(p.shape[1] + 1), work_rows(p.shape[1] + 1)
     velocity, pulls, closing = work_rows(6), work_rows(3), work_rows(3)
-    closing_rates, sums, extremes = work_rows(3), work_rows(3), work_rows(5)
+    closing_rates, sums, extremes = work_rows(3), work_rows(3), work_rows(6)
     gradient, compliant, total = work_rows(4 * order), work_rows(9), work_rows(3 * nodes)
     tables = (
         places, slopes, weights, stiff, moments, moment_picks, torsion, torsion_picks, forces,
@@ -322,6 +323,7 @@ def solve_bordered_lanes(
             reduce_rows(inner, size, width, matrix, base, lower, pivots, e * inner)
             for i in range(inner):
                 note_pivot(load(pivots, e * inner + i), extremes)
+            balance_pivots(extremes)
             multiply_columns(inner, size, width, border, left, matrix, base, lower, products)
             to_vertices(e, inner, size, width, matrix, base, border, vertices, ties)
         for v in range(begin, last + 1):
@@ -330,6 +332,7 @@ def solve_bordered_lanes(
             spring_vertices(springs, start, shares, vertices)
         for v in range(begin, last + 1):
             eliminate_vertex(v, last, border, left, vertices, ties, products, extremes)
+            balance_pivots(extremes)
         multiply_lengths(first, stop, k, count, border, radii, sides, products)
         hold_axes(axes, compliant)
         close_system(axes, compliant, products, border, system, small)
@@ -360,4 +363,5 @@ def solve_bordered_lanes(
         for lane in range(LANES):
             at = start + lane
             negative[at] = np.int64(extremes[COUNT, lane])
-            determinant[at], ratio[at] = extremes[PRODUCT, lane], pivot_ratio(extremes, lane)
+            write_determinant(extremes, lane, determinant, at)
+            ratio[at] = pivot_ratio(extremes, lane)

@@ -8,12 +8,13 @@ and the load.
 import numpy as np
 
 from equimorph.linalg.compiled import njit
-from equimorph.linalg.condensed_kernels import pivot_ratio
+from equimorph.linalg.condensed_kernels import pivot_ratio, write_determinant
 from equimorph.linalg.kernels import FLAGS, INNER, read_lanes, solve_lanes, write_lanes
 from equimorph.linalg.simd import LANES, absolute, load, spread, store, where_less, work_rows
 from equimorph.structures.spatial.chain_kernels import (
     SHARES,
     SYSTEM,
+    balance_pivots,
     complete_vertex,
     eliminate_vertex,
     note_closures,
@@ -30,7 +31,6 @@ from equimorph.structures.spatial.node_kernels import (
     COUNT,
     DEFECT,
     LARGE,
-    PRODUCT,
     RADII,
     SMALL,
     SUM,
@@ -126,7 +126,7 @@ def advance_lanes(
     velocity, pulls, closing, closing_rates = (
         work_rows(6), work_rows(3), work_rows(3), work_rows(3)
     )  # fmt: skip
-    row_pulls, given, sums, extremes = work_rows(3), work_rows(2), work_rows(3), work_rows(5)
+    row_pulls, given, sums, extremes = work_rows(3), work_rows(2), work_rows(3), work_rows(6)
     gradient, compliant, total = work_rows(4 * order), work_rows(9), work_rows(3 * nodes)
     tables = (
         places, slopes, weights, stiff, moments, moment_picks, torsion, torsion_picks, forces,
@@ -179,6 +179,7 @@ def advance_lanes(
             reduce_rows(inner, size, width, matrix, base, lower, pivots, e * inner)
             for k in range(inner):
                 note_pivot(load(pivots, e * inner + k), extremes)
+            balance_pivots(extremes)
             add_products(inner, size, width, matrix, base, lower, products)
             to_vertices(e, inner, size, width, matrix, base, BORDER, vertices, ties)
         for v in range(begin, last + 1):
@@ -187,6 +188,7 @@ def advance_lanes(
             spring_vertices(springs, start, SHARES, vertices)
         for v in range(begin, last + 1):
             eliminate_vertex(v, last, BORDER, BORDER, vertices, ties, products, extremes)
+            balance_pivots(extremes)
         hold_axes(axes, compliant)
         small_system(axes, compliant, products, closing, closing_rates, row_pulls, given, small)
         note_closures(small, SYSTEM, extremes)
@@ -215,4 +217,5 @@ def advance_lanes(
             dt[at], tangent_t[at] = small[3 * SYSTEM + 4, k], small[3 * SYSTEM + 5, k]
             residual[at] = sums[WORST, k] if whole == whole else np.nan  # noqa: PLR0124
             index[at] = np.int64(extremes[COUNT, k]) - 3
-            determinant[at], ratio[at] = extremes[PRODUCT, k], pivot_ratio(extremes, k)
+            write_determinant(extremes, k, determinant, at)
+            ratio[at] = pivot_ratio(extremes, k)
