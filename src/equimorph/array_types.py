@@ -4,7 +4,7 @@ Type checkers read the stub beside this file and take them for arrays. At run ti
 the names of the axes, which argument checks and files use. Where jaxtyping is loaded first, as by
 tests that check every shape, they are its classes.
 
-See docs/decisions.md, "Shapes are names at run time".
+See docs/decisions.md, "Array shapes are names at run time".
 """
 
 import sys

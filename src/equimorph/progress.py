@@ -1,4 +1,7 @@
-"""Bars that show how far a computation is, in a terminal and in a notebook."""
+"""Bars that show how far a computation is, in a terminal and in a notebook.
+
+In notebooks they are elements of HTML, because rich draws live there with ipywidgets only.
+"""
 
 import sys
 import time

@@ -8,6 +8,9 @@ without σ and ξ solves
 
 Cells are flat; close to the curve both states of a pair may lie outside of the images of all cells,
 or one of them alone, and the other would pass for the only one.
+
+See docs/decisions.md, "Pairs of states near singular curves are found from states near these, and
+from each other".
 """
 
 from dataclasses import dataclass

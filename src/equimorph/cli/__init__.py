@@ -1,4 +1,7 @@
-"""The command line."""
+"""The command line.
+
+See docs/decisions.md, "The command line gives OpenBLAS one thread".
+"""
 
 import os
 import sys

@@ -3,6 +3,8 @@
 The estimate is that of an iterated extended Kalman filter [BellCathey1993]_ whose model is the
 equilibrium set itself: the commanded actuators are known, unknown loads wander, and the state is
 the equilibrium over both on the sheet on which the structure was.
+
+See docs/decisions.md, "A measured state may lie on the edge of stability".
 """
 
 from collections.abc import Iterator, Mapping

@@ -2,6 +2,8 @@
 
 The first and the last element are gripped at their centres, which are the ends of the rod. The
 joints lie between the centres of successive elements and bend as the rod does there.
+
+See docs/decisions.md, "PyElastica is an extra of its own".
 """
 
 from typing import Any

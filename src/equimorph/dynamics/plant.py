@@ -1,6 +1,7 @@
 """A linkage in MuJoCo: an independent simulation of rigid bodies, joints and constraints.
 
-See docs/time.md for the model, and docs/decisions.md for what was measured.
+See docs/time.md for the model, and docs/decisions.md, "A replay is a chain of rigid links in
+MuJoCo, with its own statics beside it".
 
 `Chained` says how the entries of a mechanism and the unknowns of a structure correspond.
 """

@@ -1,4 +1,7 @@
-"""Snaps in time: folds tested by holds on both sides, and where several dampings land."""
+"""Snaps in time: folds tested by holds on both sides, and where several dampings land.
+
+See docs/decisions.md, "A snap in time is a distance from the static branch after a hold".
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -3,6 +3,8 @@
 All derivatives follow from those of what the chain carries: a hinge about the axis a through p
 moves a point x beyond it by ``∂x/∂q = a × (x − p)``, a slide by a; an earlier hinge i turns this:
 ``∂²x/∂q_i∂q = a_i × ∂x/∂q``. See [Featherstone2008]_, chapter 4.
+
+See docs/decisions.md, "A chain in space is hinges and slides, and nothing else".
 """
 
 from dataclasses import dataclass

@@ -1,6 +1,6 @@
 """Descents: where the energy leads from unstable states, both ways along the softest mode.
 
-See docs/decisions.md, "Snap landings are gradient flows".
+See docs/decisions.md, "Descents measure lengths by the soft mode".
 """
 
 from dataclasses import dataclass

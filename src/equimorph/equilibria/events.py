@@ -1,4 +1,7 @@
-"""From brackets to events: what happened to lanes on their way, and exactly where."""
+"""From brackets to events: what happened to lanes on their way, and exactly where.
+
+See docs/decisions.md, "Events are judged by the point itself".
+"""
 
 from dataclasses import dataclass
 

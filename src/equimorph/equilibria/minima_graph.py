@@ -2,7 +2,8 @@
 
 Descents from saddles are its edges; saddles are searched between its pieces.
 
-See docs/decisions.md, "Completeness is argued".
+See docs/decisions.md, "Completeness is argued" and "States of one orbit are one piece of the graph
+of minima".
 """
 
 from collections import Counter

@@ -1,4 +1,7 @@
-"""Pools of equilibria over points of the parameter space, filled by starts and by lines."""
+"""Pools of equilibria over points of the parameter space, filled by starts and by lines.
+
+See docs/decisions.md, "Searches follow lines through known equilibria".
+"""
 
 from dataclasses import dataclass
 

@@ -1,6 +1,6 @@
 """Saddles between two minima, found by pushing from one towards the other; ways over saddles.
 
-See docs/barriers.md, and docs/decisions.md, "Minima are joined by pushing".
+See docs/barriers.md, and docs/decisions.md, "Completeness is argued".
 """
 
 from dataclasses import dataclass

@@ -1,6 +1,6 @@
 """Snap landing: where a structure goes when it loses stability.
 
-See docs/decisions.md, "Snap landings are gradient flows".
+See docs/decisions.md, "Descents measure lengths by the soft mode".
 """
 
 from collections.abc import Mapping

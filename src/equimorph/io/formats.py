@@ -1,6 +1,7 @@
 """Readers of drawings: DXF by ezdxf, VTK by pyvista, PLY, and JSON files of COMPAS.
 
 The common readers of PLY leave edges out; COMPAS is not needed for its files.
+See docs/decisions.md, "Lines of drawings are read by pyvista and ezdxf".
 
 References
 ----------

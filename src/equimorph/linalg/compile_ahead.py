@@ -3,6 +3,9 @@
 `kernel_calls.txt` lists the calls of kernels from Python, those that take longest to compile first:
 name of the kernel, types of its arguments, and a mark of calls that every study makes. What kernels
 call is compiled with them. ``python -m equimorph.linalg.compile_ahead`` compiles all of them.
+
+See docs/decisions.md, "Kernels are compiled ahead, from a list" and "Kernels assign entries, not
+slices".
 """
 
 import gc

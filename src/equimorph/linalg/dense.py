@@ -1,4 +1,7 @@
-"""Dense bordered solves: for small structures, and where the condensed factorisation is unsafe."""
+"""Dense bordered solves: for small structures, and where the condensed factorisation is unsafe.
+
+See docs/decisions.md, "Unsafe pivots are refined, then replaced by pivoting".
+"""
 
 from dataclasses import dataclass
 

@@ -3,6 +3,8 @@
 Kernels keep products of pivots within 2^±256 and count the powers of two (`kernels.balance`): e is
 0 while m would do. What is compared is of one structure, and so of one size: determinants in units
 of the power of two of one of them are numbers again.
+
+See docs/decisions.md, "Determinants are m·2^e".
 """
 
 import numpy as np

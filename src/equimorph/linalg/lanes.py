@@ -1,4 +1,7 @@
-"""Running a compiled kernel over many lanes on several threads."""
+"""Running a compiled kernel over many lanes on several threads.
+
+See docs/decisions.md, "Results do not depend on threads or on the order of lanes".
+"""
 
 import os
 import threading

@@ -1,4 +1,7 @@
-"""The sparse layout: symmetric matrices of one pattern, in batches of lanes."""
+"""The sparse layout: symmetric matrices of one pattern, in batches of lanes.
+
+See docs/decisions.md, "Sparse LDLᵀ without pivoting for trusses, frames and energies".
+"""
 
 from dataclasses import dataclass
 from functools import cached_property

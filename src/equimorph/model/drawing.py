@@ -1,6 +1,6 @@
 """What to draw around the shape of a structure: supports, loads and actuators, as plain data.
 
-See docs/decisions.md, "The structure says what to draw".
+`Structure.drawing` returns them, so that no figure asks a structure for its type.
 """
 
 from dataclasses import dataclass

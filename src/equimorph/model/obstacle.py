@@ -1,6 +1,7 @@
 """Obstacles for a shape: half-planes and discs, in space extended along z.
 
-How near arcs of a structure come to them, and where.
+How near arcs of a structure come to them, and where. Distances are descriptors, so that every task
+takes them as constraints.
 """
 
 from collections.abc import Sequence

@@ -1,4 +1,7 @@
-"""Route certificates: what a proof says in numbers that anybody can check without this package."""
+"""Route certificates: what a proof says in numbers that anybody can check without this package.
+
+See docs/decisions.md, "A certificate carries the energy, not F".
+"""
 
 import json
 from pathlib import Path

@@ -1,4 +1,7 @@
-"""Structures whose parts get shorter: their energies end where a part would have no length."""
+"""Structures whose parts get shorter: their energies end where a part would have no length.
+
+See docs/decisions.md, "Structures say where their energy ends".
+"""
 
 from abc import abstractmethod
 

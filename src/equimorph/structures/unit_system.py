@@ -1,6 +1,6 @@
 """Quantities with their units: what a user writes as "12 kN m^2" as numbers in one system.
 
-See docs/decisions.md, "Units are converted where numbers enter".
+They become numbers where they enter, with the right dimension; nothing further inside knows units.
 """
 
 from collections.abc import Mapping, Sequence

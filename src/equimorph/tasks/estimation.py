@@ -1,4 +1,7 @@
-"""`estimate_state`: on which branch and under which load a measured structure is."""
+"""`estimate_state`: on which branch and under which load a measured structure is.
+
+See docs/decisions.md, "A measured state may lie on the edge of stability".
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

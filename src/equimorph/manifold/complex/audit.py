@@ -1,6 +1,6 @@
 """The audit of an equilibrium set: what was checked, and what was found.
 
-See docs/decisions.md, "Every cell is checked once more".
+See docs/decisions.md, "What is not resolved is counted, not lifted".
 """
 
 from dataclasses import dataclass

@@ -1,6 +1,6 @@
 """Tables of sets: what several tasks need of a set is computed once, and forgotten with the set.
 
-See docs/decisions.md, "Tables of a set are made once".
+They are kept in the set itself, because a table of weak keys could not hold what refers to the set.
 """
 
 from collections.abc import Callable

@@ -2,7 +2,7 @@
 
 What is missing becomes equilibria over the vertices of the grid.
 
-See docs/decisions.md, "Random checks are also the last seeds".
+See docs/decisions.md, "Checks are also the last seeds".
 """
 
 from dataclasses import dataclass, field

@@ -2,6 +2,8 @@
 
 Where only one is known, the other is started by branch switching. If the other is known but was
 lifted in a step that did not notice the crossing, it is traced again in finer steps.
+
+See docs/decisions.md, "Sheets that cross are lifted one by one".
 """
 
 from collections.abc import Callable

@@ -11,7 +11,7 @@ On an edge an eigenvalue may vanish twice although its ends do not show it. A st
 pitchforks that is narrower than the grid is crossed by edges whose ends lie on both sides of it.
 The determinant of F_z shows it: the cubic through its values at both ends, with the slopes from the
 next vertices on the same line, falls between them. There it is computed. See docs/decisions.md,
-"Edges across narrow strips are recognised by the determinant".
+"Strips narrower than the grid are recognised".
 """
 
 from dataclasses import dataclass

@@ -4,6 +4,8 @@ A fold through a grid triangle is drawn as the chord between its points on two s
 may be hidden behind it: the fold leaves through the third side and comes back, which parts what
 hangs together beyond it; and folds over one triangle, drawn apart, may belong to parts of the set
 that are joined between them, by a neck that is smaller than the triangle.
+
+See docs/decisions.md, "Folds lead into their triangles".
 """
 
 from dataclasses import dataclass

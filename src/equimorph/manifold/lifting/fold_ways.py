@@ -2,6 +2,8 @@
 
 A fold curve is smooth in the configurations and the parameters, so that the sheets stay on one side
 of it, but for cusps, at which it turns back in the parameters.
+
+See docs/decisions.md, "Folds are paired by the normals of the surface".
 """
 
 from collections.abc import Sequence

@@ -1,7 +1,4 @@
-"""Grids over the box of the free parameters, and the bisection of their edges.
-
-See docs/decisions.md, "Inner grid lines are moved a little".
-"""
+"""Grids over the box of the free parameters, and the bisection of their edges."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace

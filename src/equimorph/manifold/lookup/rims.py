@@ -1,7 +1,4 @@
-"""Rims, facets of a set on folds and constraints: bands along them, and ways out across them.
-
-See docs/decisions.md, "What a set in shreds is asked costs a minute at most".
-"""
+"""Rims, facets of a set on folds and constraints: bands along them, and ways out across them."""
 
 from dataclasses import dataclass
 

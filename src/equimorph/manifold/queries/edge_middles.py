@@ -1,4 +1,7 @@
-"""Exact states of a set next to the middles of the edges of its cells."""
+"""Exact states of a set next to the middles of the edges of its cells.
+
+See docs/decisions.md, "States in the explorer lie on curved cells".
+"""
 
 from dataclasses import dataclass, replace
 

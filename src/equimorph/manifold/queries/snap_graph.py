@@ -1,4 +1,7 @@
-"""Where snaps lead: from each piece of stability boundary to the stratum where it lands."""
+"""Where snaps lead: from each piece of stability boundary to the stratum where it lands.
+
+See docs/decisions.md, "Snaps at folds and barriers are two questions".
+"""
 
 from collections.abc import Iterator
 from dataclasses import dataclass

@@ -3,7 +3,7 @@
 Angles are measured in the embedding: at the corners of triangles, between the faces of tetrahedra.
 An upright cell projects onto the parameters as the parity of its index demands, and looks the same
 way as the cells around it in the tangent spaces at its corners. Tetrahedra that are steep against
-these count less. See docs/decisions.md, "Steep tetrahedra count as slivers".
+these count less. See docs/decisions.md, "One rule for refills".
 
 No triangle between two curves (folds, constraints, crossings, sides of the box) is better than the
 corner at which these meet. And where two eigenvalues nearly vanish together, a fold and a crossing

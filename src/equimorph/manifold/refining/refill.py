@@ -6,6 +6,8 @@ into one of its neighbours, and the same star with its vertex moved along the se
 about all of them: there must be fewer poor cells or a better worst one, no edge that deviates from
 the set by more than a limit, and none that was bisected before. Marked facets (folds, constraints,
 crossings, sides of the box) and the rim of a patch stay what they are.
+
+See docs/decisions.md, "One rule for refills".
 """
 
 from collections.abc import Callable

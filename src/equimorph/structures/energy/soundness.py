@@ -5,6 +5,8 @@ constraints, in the metric and each relative to its typical size, span what cons
 do. Where their smallest singular value vanishes, as in a chain whose links lie in one line, the
 multipliers grow without bound, and equilibria with forces of opposite sign meet at infinity: no
 equilibrium is there, and sets end.
+
+See docs/decisions.md, "Structures say where their energy ends".
 """
 
 from collections.abc import Callable, Mapping

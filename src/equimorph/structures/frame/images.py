@@ -1,4 +1,7 @@
-"""Symmetries of frames, planar or in space: mirror images and half turns about the middle."""
+"""Symmetries of frames, planar or in space: mirror images and half turns about the middle.
+
+They are proposed by geometry, and confirmed by the Lagrangian at random points.
+"""
 
 from abc import abstractmethod
 from dataclasses import dataclass

@@ -1,4 +1,7 @@
-"""Pressure on a chain of members of a frame: the area between the chain and its chord."""
+"""Pressure on a chain of members of a frame: the area between the chain and its chord.
+
+See docs/decisions.md, "Pressure on rods and frames is an enclosed area".
+"""
 
 from dataclasses import dataclass
 from functools import cached_property

@@ -1,6 +1,8 @@
 """PlanarMechanics of the clamped rod: energy, residual, derivatives and solves in batches.
 
 Fields are recovered to the accuracy that they have at vertices.
+
+See docs/decisions.md, "Kernels of the rod" and "Two mechanics of rods stay".
 """
 
 from dataclasses import dataclass

@@ -1,4 +1,7 @@
-"""Gauss–Lobatto elements along the rod: nodes, weights, stiffness, spectral integration."""
+"""Gauss–Lobatto elements along the rod: nodes, weights, stiffness, spectral integration.
+
+See docs/decisions.md, "Six elements of degree nine".
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -173,7 +173,8 @@ def largest_norms(
 
     The square of the norm is a polynomial in cos ϑ. A maximum M of one of degree m is at least
     M cos(m ϑ) within an angle of ϑ < π/m (M. Riesz), so that a peak of the grid lies near it
-    and is not lower than `LOWEST` of the highest; each of those is polished.
+    and is not lower than `LOWEST` of the highest; each of those is polished. Polishing the best
+    place of the grid alone gives values that jump, and bounds that are located at the jump.
     """
     series = np.einsum("ij,lejk->leik", mesh.reference.to_legendre, values)
     angles = np.linspace(np.pi, 0.0, FINE * mesh.degree + 1)

@@ -1,4 +1,7 @@
-"""Movements of a planar rod out of its plane: the second variation, its inertia and solves."""
+"""Movements of a planar rod out of its plane: the second variation, its inertia and solves.
+
+See docs/decisions.md, "Leaving the plane is a second variation of its own".
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,4 +1,7 @@
-"""Conservative pressure on a rod: the enclosed area, and a matrix that couples all angles."""
+"""Conservative pressure on a rod: the enclosed area, and a matrix that couples all angles.
+
+See docs/decisions.md, "Pressure on rods and frames is an enclosed area".
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

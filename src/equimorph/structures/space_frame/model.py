@@ -1,4 +1,7 @@
-"""The numbers of a frame in space: its Lagrangian as constant arrays."""
+"""The numbers of a frame in space: its Lagrangian as constant arrays.
+
+See docs/decisions.md, "Frames in space share rotations and eliminate places".
+"""
 
 from dataclasses import dataclass
 from functools import cached_property

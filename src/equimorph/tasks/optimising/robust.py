@@ -1,7 +1,4 @@
-"""`robust_optimum`: the state that is best in the worst case over a box, and its price.
-
-See docs/decisions.md, "A worst case ends at an edge, its limits do not".
-"""
+"""`robust_optimum`: the state that is best in the worst case over a box, and its price."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace

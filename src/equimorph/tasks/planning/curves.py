@@ -4,6 +4,8 @@ See `equimorph.tasks.planning.shortening` for what is least. Steps are those of 
 [NocedalWright2006]_, section 19.3: the forces y_j of the walls are unknowns, too, with
 ``y_j g_j = ν w``, so that walls may become weaker by large factors. Several curves are made shorter
 at once, each by its own steps.
+
+See docs/decisions.md, "Shortest routes are geodesics beside walls".
 """
 
 from collections.abc import Sequence

@@ -1,4 +1,7 @@
-"""Where on its fold a route snaps best: straight moves there, and on from where the snap lands."""
+"""Where on its fold a route snaps best: straight moves there, and on from where the snap lands.
+
+See docs/decisions.md, "A place of a snap is sought with what leads there and on".
+"""
 
 from dataclasses import dataclass
 from itertools import pairwise

@@ -1,4 +1,7 @@
-"""`word_graph`: words that motions of one parameter at a time lead to, followed to their ends."""
+"""`word_graph`: words that motions of one parameter at a time lead to, followed to their ends.
+
+See docs/decisions.md, "Words are followed, not searched".
+"""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
