@@ -25,7 +25,7 @@ from equimorph.manifold.complex.vertices import Vertices, free_vertices
 from equimorph.manifold.geometry.exact_points import Corrected
 from equimorph.manifold.geometry.points import on_fold
 from equimorph.manifold.geometry.simplices import squared_sides
-from equimorph.manifold.geometry.topology import chains, flags_of, keys_of, labels
+from equimorph.manifold.geometry.topology import chains, count_corners, flags_of, keys_of, labels
 from equimorph.manifold.lookup.exact_states import exact_states
 from equimorph.manifold.queries.levels import whole_set
 from equimorph.structures import States
@@ -269,10 +269,12 @@ def _insert_crossings(fabric: Fabric, ways: list[Way]) -> tuple[Fabric, Pairs] |
             return None
         fabric = fabric.bisect(ends, new)
     wall = np.array([pair for way in ways for pair in pairwise(_numbers(way, number))], int)
-    base = len(fabric.vertices)
-    pairs = [fabric.cells[:, list(two)] for two in ((0, 1), (1, 2), (0, 2))]
+    base, wall = len(fabric.vertices), wall.reshape(-1, 2)
+    on = np.zeros(base, bool)
+    on[wall] = True
+    beside = fabric.cells[count_corners(on, fabric.cells) > 1]
+    pairs = [beside[:, list(two)] for two in ((0, 1), (1, 2), (0, 2))]
     known = np.concatenate([keys_of(pair, base) for pair in pairs])
-    wall = wall.reshape(-1, 2)
     return (fabric, wall) if np.isin(keys_of(wall, base), known).all() else None
 
 

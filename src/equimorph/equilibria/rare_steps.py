@@ -85,6 +85,9 @@ class RareSteps:
         """
         rows = self.rows
         at = np.flatnonzero((rows.stage == CONVERGED) & (rows.what & BRANCH != 0))
+        if not self.options.locate_jumps:
+            rows.stage[at] = REFUSED
+            return Events.join([], self.curve.metric.size)
         bracket = rows.bracket(at, move)
         place = locate_branch_point(self.curve.take(bracket.lanes), bracket)
         rows.stage[at[~place.found]] = REFUSED

@@ -75,6 +75,8 @@ class TraceOptions:
     first_step, largest_step, smallest_step: lengths in the metric. turning: angle between the
     tangents at both ends of a step that the step control aims at, in radians. steps: limit per
     lane. locate_passed: whether folds and branch points that do not end a lane are located.
+    locate_jumps: whether branch points are located in steps that change the index without a turn;
+    without, steps are refused until a lane that meets one is lost: only arrivals count then.
     retries: how often lanes whose events could not be located are traced again, each time with
     steps four times shorter. look_inside: whether steps that come close to a singular state are
     searched for events that their ends do not show.
@@ -89,6 +91,7 @@ class TraceOptions:
     steps: int = 2000
     record: bool = True
     locate_passed: bool = True
+    locate_jumps: bool = True
     retries: int = 2
     look_inside: bool = True
 

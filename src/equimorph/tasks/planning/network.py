@@ -28,7 +28,7 @@ BROAD = 0.1
 MATCH = 1e-5
 """Distance in the metric within which a lift leads to the state that is meant."""
 
-SEARCHED = replace(FINE, retries=0)
+SEARCHED = replace(FINE, retries=0, locate_jumps=False)
 """Step control of lifts as fine as the final ones, where one that fails is one of many."""
 
 CRITICAL = (1, 4, 7)
@@ -80,9 +80,9 @@ class Demands:
         if self.closely:
             return SEARCHED
         if self.margin > 0.0:
-            return TraceOptions(largest_step=CLOSE)
+            return TraceOptions(largest_step=CLOSE, locate_jumps=False)
         step = 0.5 if self.objective.is_length else BROAD
-        return TraceOptions(first_step=0.1, largest_step=step)
+        return TraceOptions(first_step=0.1, largest_step=step, locate_jumps=False)
 
     def admissible(self, states: States) -> Flags:
         """Whether states keep the margin (by one count of inertia) and the constraints."""
