@@ -1,4 +1,4 @@
-"""Side branches that leave a symmetric sheet and come back to it: tubes narrower than the grid."""
+"""Strips of sets that are narrower than the grid: between pitchforks, and from folds to bounds."""
 
 import numpy as np
 import pytest
@@ -72,3 +72,50 @@ def test_strips_that_no_vertex_meets_are_found_or_named(width, grid, sign):
     if width > 0.01 or grid != (6, 6):
         assert audit.clean
     assert not audit.clean or audit.euler_characteristic == -1
+
+
+def folded(level):
+    """x² = level over a and b: two sheets that meet in a fold."""
+    parameters = [
+        em.Parameter("a", "1", 1.0, "actuator", 0.0),
+        em.Parameter("b", "1", 1.0, "load", 0.0),
+    ]
+    unknowns = [em.Unknown("x", "0", guesses=(-2.5, 3.5))]
+    return em.EnergyStructure(f"x**3/3 - ({level})*x", unknowns, parameters)
+
+
+def bounded(level, width, grid):
+    """The set with −width/2 ≤ x ≤ width: strips of widths² along the fold, one under each sheet."""
+    bend = em.Descriptor("bend", "1", lambda z, p: np.maximum(z[:, 0], -2.0 * z[:, 0]))
+    with unchecked():
+        return em.equilibrium_set(folded(level), BOX, within=[bend <= width], intervals=grid)
+
+
+STRAIGHT, PARABOLA, WAVE = "a - 0.13*b", "a - 0.4*b**2", "a - 0.13*b - 0.3*sin(2*b)"
+
+
+@pytest.mark.parametrize(
+    ("level", "width", "grid", "most"),
+    [
+        pytest.param(STRAIGHT, 0.3, (6, 6), 100, id="wide"),
+        pytest.param(STRAIGHT, 0.1, (6, 6), 400, id="narrow"),
+        pytest.param(STRAIGHT, 0.05, (12, 12), 500, id="very narrow"),
+        pytest.param(PARABOLA, 0.1, (7, 9), 500, id="parabola"),
+        pytest.param(WAVE, 0.1, (6, 6), 500, id="wave"),
+    ],
+)
+def test_strips_between_a_fold_and_a_constraint_are_led_along(level, width, grid, most):
+    """One piece, a disc, with few vertices, down to a 60th of an interval wide under one sheet.
+
+    States are the roots of x² = level. The narrow strip took 1065 vertices, and was not clean.
+    """
+    eset = bounded(level, width, grid)
+    assert_faithful(eset)
+    assert eset.audit.euler_characteristic == 1
+    assert eset.audit.components == 1
+    assert eset.audit.vertices < most
+    b = np.linspace(-0.45, 0.65, 22)
+    edge = np.array([-eval(level, {"a": 0.0, "b": each, "sin": np.sin}) for each in b])
+    for share, roots in ((0.6, 1), (0.2, 2)):
+        point = eset.over(a=edge + share * width**2, b=b).point
+        assert np.bincount(point, minlength=len(b)).tolist() == [roots] * len(b)

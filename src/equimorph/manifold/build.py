@@ -26,6 +26,7 @@ from equimorph.manifold.lifting.grid import (
 )
 from equimorph.manifold.lifting.pairing import Pairing, start_pairing
 from equimorph.manifold.lifting.seeds import Seeds, is_symmetric, seeds
+from equimorph.manifold.lifting.strips import strips_astray
 from equimorph.manifold.lifting.tile_rounds import TileRounds
 from equimorph.manifold.lifting.tiles import cuts_between
 from equimorph.manifold.lifting.unseen import UnseenFinder
@@ -291,6 +292,7 @@ class _Lifting:
                 break
             bisected += cells.doubtful
             chosen, exits = _longest_edges(pairing, cells), unseen.exits | ring_middles(pairing)
+            exits |= strips_astray(pairing, cells.astray)
             # first those through which tongues and strips leave their cells
             chosen = np.concatenate([np.array(list(exits), int), np.setdiff1d(chosen, list(exits))])
             pairing.use_mesh(bisect(pairing.mesh, chosen, exits))

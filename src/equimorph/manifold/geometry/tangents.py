@@ -122,6 +122,16 @@ def cap_slopes(
     return np.stack(slopes, axis=1) / (2.0 * METRIC_DIFFERENCE)
 
 
+def cap_normals(setting: Setting, z: Lanes, p: Parameters) -> Places:
+    """Slopes of the largest excess over the constraints along the scaled free parameters."""
+    n, d = setting.structure.unknowns, len(setting.free)
+    rows = np.zeros((len(z), d, n + d))
+    rows[:, :, n:] = np.eye(d)
+    frames = tangent_frames(setting, z, p, rows)
+    slopes = cap_slopes(setting, z, p, frames)
+    return np.asarray(np.linalg.solve(frames[:, :, -d:], slopes[:, :, None])[:, :, 0])
+
+
 @dataclass(frozen=True)
 class Ends(Columns):
     """One end of edges: its point, tangent space, and the slopes of what must stay zero on them."""

@@ -141,7 +141,7 @@ class Cells:
 
     corners (C, d + 1), index (C,); folds, caps, crossings: facets on folds, on constraints and
     where sheets cross; doubtful: grid cells over which the set is undecided; touching: free
-    parameters of points at which sheets touch (see `approaches`).
+    parameters of points at which sheets touch (see `approaches`); astray: see `Discs`.
     """
 
     corners: Int[np.ndarray, "C corners"]
@@ -152,6 +152,7 @@ class Cells:
     doubtful_triangles: Int[np.ndarray, " t"] = field(default_factory=_nothing)
     doubtful_tetrahedra: Items = field(default_factory=_nothing)
     touching: Float[np.ndarray, "places axes"] = field(default_factory=lambda: np.zeros((0, 0)))
+    astray: Int[np.ndarray, "a 4"] = field(default_factory=lambda: np.zeros((0, 4), int))
 
     @property
     def doubtful(self) -> int:
@@ -178,7 +179,7 @@ class CellFinder:
         if pairing.mesh.dimension == 2:
             discs = close(pairing)[0] if close else assemble(pairing, find_loops(pairing))
             marked = (discs.folds, discs.caps, discs.crossings)
-            return Cells(discs.corners, discs.index, *marked, discs.doubtful)
+            return Cells(discs.corners, discs.index, *marked, discs.doubtful, astray=discs.astray)
         if close and self._known is None:
             mesh, found = pairing.mesh, close(pairing)
             self._known = Volumes(Seen.of(pairing), mesh.tetrahedra, mesh.faces, *found)
@@ -186,7 +187,10 @@ class CellFinder:
             self._known = volumes_over(pairing, self._known)
         discs, balls = self._known.discs, self._known.balls
         marked = (balls.folds, balls.caps, balls.crossings)
-        return Cells(balls.corners, balls.index, *marked, discs.doubtful, balls.doubtful)
+        return Cells(
+            balls.corners, balls.index, *marked, discs.doubtful, balls.doubtful,
+            astray=discs.astray,
+        )  # fmt: skip
 
 
 def _segments(pairing: Pairing) -> Cells:

@@ -13,10 +13,13 @@ from equimorph.arrays import Flags, Float, Items, Pairs, Some, Values
 from equimorph.columns import Columns
 from equimorph.manifold.complex.base_mesh import BaseMesh
 from equimorph.manifold.geometry.simplices import shares_in
+from equimorph.manifold.lifting.grid import NEAR_AN_END
 from equimorph.manifold.lifting.pairing import Pairing
 
 STRAIGHT = 0.1
 """Least mean of one and the cosine between a curve and its chord by which slopes are divided."""
+FIRST = 0.1
+"""Part of a side up to which it is split at first, if it is to be split nearer to an end."""
 PLACES = 9
 """Places along a curve at which its distance from a side is taken."""
 EQUILATERAL = np.array([[0.0, 0.0], [1.0, 0.0], [0.5, np.sqrt(0.75)]])
@@ -97,12 +100,31 @@ class Courses(Columns):
 class WaysOut(Columns):
     """Where the tangents at both ends of chords lead out of their triangles.
 
-    apexes (n, 2): number, in the triangle, of the corner opposite the side; middle (n, 3):
-    barycentric coordinates of the middle between both places.
+    apexes (n, 2): number, in the triangle, of the corner opposite the side; starts, places
+    (n, 2, 3): barycentric coordinates of both ends, and where they lead to.
     """
 
     apexes: Pairs
-    middle: Shares
+    starts: BothShares
+    places: BothShares
+
+    @property
+    def together(self) -> Flags:
+        """Whether both ways lead through one side."""
+        return np.asarray(self.apexes[:, 0] == self.apexes[:, 1])
+
+    @property
+    def middle(self) -> Shares:
+        """Barycentric coordinates of the middle between both places."""
+        return np.asarray(self.places.mean(axis=1))
+
+    @property
+    def cross(self) -> Flags:
+        """Whether both ways cross before they leave, if they do so through one side."""
+        way = (self.places - self.starts) @ EQUILATERAL
+        gaps = [(each[:, 1] - each[:, 0]) @ EQUILATERAL for each in (self.starts, self.places)]
+        before, after = (way[:, 0, 0] * gap[:, 1] - way[:, 0, 1] * gap[:, 0] for gap in gaps)
+        return np.asarray(before * after < 0.0)
 
 
 def ways_out(
@@ -124,7 +146,7 @@ def ways_out(
         np.put_along_axis(way, shares.argmin(axis=1)[:, None], np.inf, axis=1)
         apexes.append(way.argmin(axis=1))
         places.append(shares + way.min(axis=1, keepdims=True) * rates)
-    return WaysOut(np.stack(apexes, axis=1), 0.5 * (places[0] + places[1]))
+    return WaysOut(np.stack(apexes, axis=1), courses.shares, np.stack(places, axis=1))
 
 
 def on_sides(mesh: BaseMesh, triangle: Some, apexes: Items, places: Shares) -> tuple[Items, Values]:
@@ -135,3 +157,14 @@ def on_sides(mesh: BaseMesh, triangle: Some, apexes: Items, places: Shares) -> t
     along = mesh.triangles[triangle, first] == mesh.edges[sides, 0]
     start, end = places[every, first], places[every, last]
     return sides, np.where(along, end, start) / (start + end)
+
+
+def split_sides(mesh: BaseMesh, triangle: Some, ways: WaysOut) -> dict[int, float]:
+    """Sides through which two ways lead together, with the part of the side in their middle.
+
+    Where that is very near an end of the side, it is split farther away from it at first.
+    """
+    sides, shares = on_sides(mesh, triangle, ways.apexes[:, 0], ways.middle)
+    inner = (shares > NEAR_AN_END) & (shares < 1.0 - NEAR_AN_END)
+    shares = np.where(inner, shares, np.clip(shares, FIRST, 1.0 - FIRST))
+    return dict(zip(sides.tolist(), shares.tolist(), strict=True))

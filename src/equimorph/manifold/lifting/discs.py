@@ -45,7 +45,8 @@ class Discs:
     caps, crossings: their sides on folds, on constraints, and where sheets cross; doubtful: grid
     triangles whose polygons could not be closed and cut without doubt. met: which sides ab,
     bc, ca of each triangle lie on crossings; sheet: number, over its grid triangle, of the smooth
-    sheet that it belongs to.
+    sheet that it belongs to. astray: doubtful grid triangles with the fold and both ends of an open
+    polygon that finds no corner there.
     """
 
     corners: Triples
@@ -57,6 +58,7 @@ class Discs:
     caps: Int[np.ndarray, "c 2"]
     crossings: Int[np.ndarray, "x 2"]
     doubtful: Int[np.ndarray, " k"]
+    astray: Int[np.ndarray, "a 4"]
 
 
 @dataclass
@@ -71,6 +73,7 @@ class _Found:
     caps: set[Chord] = field(default_factory=set)
     crossings: set[Chord] = field(default_factory=set)
     undecided: set[int] = field(default_factory=set)
+    astray: list[tuple[int, int, int, int]] = field(default_factory=list)
 
 
 def assemble(pairing: Pairing, loops: Loops) -> Discs:
@@ -101,6 +104,7 @@ def assemble(pairing: Pairing, loops: Loops) -> Discs:
         _distinct(whole.caps, found.caps, base),
         crossings,
         np.array(sorted(found.undecided), int),
+        np.array(found.astray, int).reshape(-1, 4),
     )
 
 
@@ -173,6 +177,9 @@ def _close(pairing: Pairing, plans: list[Plan], found: _Found) -> None:
     for plan, point in zip(open_plans, extra, strict=True):
         if point is None:
             found.undecided.add(plan.polygon.triangle)
+            if len(folds := plan.those(TURN)) == 1:
+                chain = plan.points[0], plan.points[-1]
+                found.astray.append((plan.polygon.triangle, folds[0], *chain))
             continue
         found.caps.update({chord_of(plan.points[0], point), chord_of(plan.points[-1], point)})
         plan.append(point, int(pairing.points.kind[point]))

@@ -13,20 +13,25 @@ from operator import attrgetter
 
 import numpy as np
 
-from equimorph.arrays import Bool, Int, ItemFlags, Items, Some, Triples
+from equimorph.arrays import Bool, Float, Int, ItemFlags, Items, Some, Triples
 from equimorph.linalg.lanes import results_of
 from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.setting import embed
-from equimorph.manifold.geometry.tangents import frames_in_embedding, tangent_frames
+from equimorph.manifold.geometry.tangents import cap_normals, frames_in_embedding, tangent_frames
+from equimorph.manifold.lifting.courses import Courses
 from equimorph.manifold.lifting.kernels import close_loops, find_plain_loops
 from equimorph.manifold.lifting.pairing import Pairing
 
 ALONG, ASIDE = 0.1, 0.3
 """Sines of angles between sheets and chords: along them at most, aside at least."""
+STRAIGHT = 0.9
+"""Cosine of the angles between a constraint at both ends of a chain and the chord between them from
+which on it leads from one to the other."""
 AT_ONCE = 8192
 """Triangles around which loops are found together, while other threads do other ones."""
 NEARER = 0.5
 """Most that the gap in a chain may be, relative to the distance from another chain."""
+Pairwise = Bool[np.ndarray, "n n"]
 
 
 @dataclass(frozen=True)
@@ -228,7 +233,31 @@ def _closes_alone(pairing: Pairing, chains: list[Polygon]) -> bool:
     crossings = [_crossings(pairing, chain) for chain in chains]
     if len(chains) == 2 and crossings[0] and crossings[0] == crossings[1]:
         return True
-    return _close_themselves(pairing, chains) or _on_own_sheets(pairing, chains)
+    rules = (_close_themselves, _on_own_sheets, _lead_to_themselves)
+    return any(rule(pairing, chains) for rule in rules)
+
+
+def _lead_to_themselves(pairing: Pairing, chains: list[Polygon]) -> bool:
+    """Whether the constraint leads from each chain's ends to each other, and to no other chain.
+
+    It leads along a sheet of one index, unless a fold meets it: to this fold at most one chain may
+    lead, with ends of two indices. Another sheet of the same index must lie aside.
+    """
+    store, setting = pairing.points, pairing.setting
+    ends = np.array([(chain.points[0], chain.points[-1]) for chain in chains])
+    index = store.index[ends]
+    plain = index[:, 0] == index[:, 1]
+    if np.count_nonzero(~plain) > 1:
+        return False
+    normals = cap_normals(setting, store.z[ends.ravel()], store.p[ends.ravel()])
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+    triangle = np.full(np.count_nonzero(plain), chains[0].triangle)
+    courses = Courses.of(pairing, ends[plain], triangle, normals.reshape(*ends.shape, -1)[plain])
+    if not (courses.cosines > STRAIGHT).all():
+        return False
+    off, own = _slopes_to(pairing, ends.ravel())
+    rival = ~own & (index.ravel()[:, None] == index.ravel())
+    return bool((np.maximum(off, off.T)[rival] > ASIDE).all())
 
 
 def _on_own_sheets(pairing: Pairing, chains: list[Polygon]) -> bool:
@@ -238,6 +267,17 @@ def _on_own_sheets(pairing: Pairing, chains: list[Polygon]) -> bool:
     sheets that cross is seen along the other, if that bends away from it, but not the other way.
     """
     ends = np.array([(chain.points[0], chain.points[-1]) for chain in chains]).ravel()
+    off, own = _slopes_to(pairing, ends)
+    itself = np.eye(len(ends), dtype=bool)
+    aside = np.maximum(off, off.T)[~own]
+    return bool((off[own & ~itself] < ALONG).all() and (aside > ASIDE).all())
+
+
+def _slopes_to(pairing: Pairing, ends: Items) -> tuple[Float[np.ndarray, "n n"], Pairwise]:
+    """Sines of the angles between the sheets at ends and the chords to others; which are partners.
+
+    Ends are those of chains, two of each.
+    """
     setting, store = pairing.setting, pairing.points
     z, p = store.z[ends], store.p[ends]
     place, d = embed(setting, z, p), len(setting.free)
@@ -249,10 +289,7 @@ def _on_own_sheets(pairing: Pairing, chains: list[Polygon]) -> bool:
     length = np.maximum(np.linalg.norm(chord, axis=2), 1e-300)
     off = np.sqrt(np.maximum(1.0 - (np.linalg.norm(flat, axis=2) / length) ** 2, 0.0))
     chain = np.arange(len(ends)) // 2
-    own = chain[:, None] == chain[None]
-    itself = np.eye(len(ends), dtype=bool)
-    aside = np.maximum(off, off.T)[~own]
-    return bool((off[own & ~itself] < ALONG).all() and (aside > ASIDE).all())
+    return off, chain[:, None] == chain[None]
 
 
 def _close_themselves(pairing: Pairing, chains: list[Polygon]) -> bool:

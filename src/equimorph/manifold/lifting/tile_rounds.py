@@ -221,6 +221,7 @@ def _discs_in_whole(discs: Discs, numbers: Items, part: Part, kept: ItemFlags) -
         numbers[discs.caps],
         numbers[discs.crossings],
         triangles[discs.doubtful],
+        np.column_stack([triangles[discs.astray[:, 0]], numbers[discs.astray[:, 1:]]]),
     )
 
 

@@ -18,7 +18,7 @@ from equimorph.manifold.geometry.exact_points import pin_crossings
 from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.setting import Setting
 from equimorph.manifold.lifting.cells import Cells, Seen
-from equimorph.manifold.lifting.courses import on_sides, ways_out
+from equimorph.manifold.lifting.courses import split_sides, ways_out
 from equimorph.manifold.lifting.fold_chords import (
     FoldChords,
     Turns,
@@ -30,7 +30,6 @@ from equimorph.manifold.lifting.fold_chords import (
     lie_inside,
     sharp_turns,
 )
-from equimorph.manifold.lifting.grid import NEAR_AN_END
 from equimorph.manifold.lifting.pairing import Pairing
 from equimorph.manifold.lifting.polygon_cuts import chord_of, planes
 from equimorph.manifold.lifting.stationary_points import approaches, stationary_points
@@ -172,11 +171,8 @@ def _enter_tips(pairing: Pairing, turns: Turns) -> None:
 def _exits(pairing: Pairing, turns: Turns) -> dict[int, float]:
     """Edges to which curves lead straight from both their ends; where, in the middle of both."""
     ways = ways_out(pairing, turns.ends, turns.triangle, turns.normals)
-    same = np.flatnonzero(ways.apexes[:, 0] == ways.apexes[:, 1])
-    given = turns.triangle[same], ways.apexes[same, 0], ways.middle[same]
-    sides, shares = on_sides(pairing.mesh, *given)
-    inner = (shares > NEAR_AN_END) & (shares < 1.0 - NEAR_AN_END)
-    return dict(zip(sides[inner].tolist(), shares[inner].tolist(), strict=True))
+    same = np.flatnonzero(ways.together)
+    return split_sides(pairing.mesh, turns.triangle[same], ways.take(same))
 
 
 def _distinct(places: Places, setting: Setting) -> Places:
@@ -201,7 +197,7 @@ def _crossing_turns(pairing: Pairing, cells: Cells, wanted: Bool[np.ndarray, " T
     along = crossing_directions(setting, points.z[used], points.p[used])
     across = np.stack([-along[:, 1], along[:, 0]], axis=-1)[place.reshape(ends.shape)]
     ways = ways_out(pairing, ends, triangle, across)
-    chosen = ways.apexes[:, 0] == ways.apexes[:, 1]
+    chosen = ways.together
     ends, triangle, across = ends[chosen], triangle[chosen], across[chosen]
     if len(ends) == 0:
         return None
