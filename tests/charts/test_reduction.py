@@ -43,8 +43,9 @@ def test_energies_of_the_spring_are_equal_on_its_axis(by_energy):
     assert np.abs(barrier.points[:, 1]).max() < 1e-9
     x = barrier.points[:, 0]
     assert x.min() == pytest.approx(0.3, abs=1e-12)
-    assert x.max() == pytest.approx(1.0, abs=0.04)
-    np.testing.assert_allclose(barrier.jump, 2.0 * np.arccos(x), rtol=0, atol=1e-3)
+    assert x.max() == pytest.approx(1.0, abs=1e-5)
+    off = x < 0.999  # at the cusp both sides are one
+    np.testing.assert_allclose(barrier.jump[off], 2.0 * np.arccos(x[off]), rtol=0, atol=1e-5)
     assert by_energy.gaps.loops == ()
     assert by_energy.domain.size == pytest.approx(1.0, abs=1e-3)
 

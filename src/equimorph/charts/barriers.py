@@ -6,11 +6,22 @@ from itertools import pairwise
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
-from equimorph.arrays import Facets, Float, Int, ItemValues, Place, Places, Points, Some
+from equimorph.arrays import (
+    Facets,
+    Float,
+    Int,
+    ItemValues,
+    Place,
+    Places,
+    Points,
+    Some,
+    VertexFlags,
+)
 from equimorph.charts.domain import Domain, kinds_along, without_slivers
 from equimorph.charts.location import Cells, EdgeKind, facet_kinds
 from equimorph.charts.preference import Preference
 from equimorph.charts.regions import regions_within
+from equimorph.manifold.geometry.points import on_fold
 from equimorph.manifold.geometry.topology import flags_of, pieces
 from equimorph.model import Box
 from equimorph.structures import States
@@ -95,8 +106,9 @@ def barriers_of(cells: Cells, preference: Preference) -> tuple[Barrier, ...]:
     real = np.isfinite(apart).all(axis=1) & (apart > JUMP).any(axis=1)
     structure = cells.eset.structure
     found = []
+    folded = on_fold(cells.eset.kinds)[used]
     for kind in dict.fromkeys(kinds[real].tolist()):
-        for piece in pieces(number[real & (kinds == kind)]):
+        for piece in _pieces_between_folds(number[real & (kinds == kind)], folded, kind):
             own = np.unique(piece) if piece.ndim == 2 else piece
             local = np.searchsorted(own, piece) if piece.ndim == 2 else np.arange(len(own))
             near = cells.eset.points[used[own]]
@@ -104,6 +116,20 @@ def barriers_of(cells: Cells, preference: Preference) -> tuple[Barrier, ...]:
             points = cells.values[used[own]]
             found.append(Barrier(kind, points, near, far, jump[own], local))
     return _each_once(found, cells)
+
+
+def _pieces_between_folds(facets: Facets, folded: VertexFlags, kind: str) -> list[Facets]:
+    """Pieces of a barrier; ties over two parameters end on folds: both sides meet at a cusp.
+
+    `facets`: by numbers of vertices. `folded`: which of these lie on folds.
+    """
+    if kind != EdgeKind.TIE or facets.shape[1] != 2:
+        return list(pieces(facets))
+    row, side = np.nonzero(folded[facets])
+    apart = facets.copy()
+    apart[row, side] = len(folded) + np.arange(len(row))
+    old = np.concatenate([np.arange(len(folded)), facets[row, side]])
+    return [old[piece] for piece in pieces(apart)]
 
 
 def _across(

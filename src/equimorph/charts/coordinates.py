@@ -19,7 +19,6 @@ from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.geometry.setting import Setting
 from equimorph.manifold.geometry.tangents import frames_in_embedding, split_step, tangent_frames
-from equimorph.manifold.lookup.exact_states import exact_states
 from equimorph.model import Descriptor, position
 from equimorph.structures import value_of
 from equimorph.tolerances import METRIC_DIFFERENCE
@@ -159,13 +158,8 @@ class Coordinates(Scalars):
             Bases of planes near the tangent spaces of some lanes: with these, Newton is regular at
             folds, too.
         folded
-            Lanes next to folds. Where the coordinates are the parameters, that does not matter.
+            Lanes next to folds.
         """
-        if self.projecting:
-            p = p.copy()
-            p[:, self.places] = wanted
-            z, good, index = exact_states(self.setting.structure, z, p)
-            return z, p, good, index
         quick = solve_over_parameters(self, z, p, wanted, regular := np.flatnonzero(~folded))
         z, p, good = z.copy(), p.copy(), np.zeros(len(wanted), bool)
         index = np.full(len(wanted), -1)

@@ -24,9 +24,6 @@ from equimorph.arrays import (
 )
 from equimorph.charts.coordinates import Coordinates
 from equimorph.charts.preparation import on_box
-from equimorph.equilibria import ParameterLine, TraceOptions
-from equimorph.equilibria.trace import trace
-from equimorph.equilibria.trace_options import EventCode
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.complex.kept_tables import adjacency_of, places_of
 from equimorph.manifold.geometry.points import VertexKind, are_singular, on_fold
@@ -41,16 +38,14 @@ from equimorph.manifold.geometry.topology import (
     runs,
 )
 from equimorph.manifold.lookup.cell_index import CellIndex, Hits
-from equimorph.manifold.lookup.exact_states import root_weights
 from equimorph.model import are_feasible
 from equimorph.structures import States, join_states
 from equimorph.tolerances import SAME_STATE
 
 Guess = tuple[Float[np.ndarray, "hits size"], Float[np.ndarray, "hits parameters"]]
 
-OVERHANG, WIDE = 0.3, 1.0
-"""How far beyond a cell at an edge, in barycentric coordinates, a point may lie to be tried: by
-parameters, and by descriptors, whose values over a cell bend more."""
+WIDE = 1.0
+"""How far beyond a cell at an edge, in barycentric coordinates, a point may lie to be tried."""
 CHUNK = 4096
 """Points whose states are found at once."""
 SLACK = 1e-9
@@ -151,8 +146,7 @@ class Cells:
 
     @cached_property
     def _index(self) -> CellIndex:
-        farthest = OVERHANG if self.coordinates.projecting else WIDE
-        overhang = np.where(self._edge, farthest, 0.0)
+        overhang = np.where(self._edge, WIDE, 0.0)
         return CellIndex.of(self.values[self.corners], overhang)
 
     @cached_property
@@ -174,19 +168,28 @@ class Cells:
     def _at_fold(self) -> Bool[np.ndarray, " own"]:
         return np.asarray(are_singular(self.eset.kinds)[self.corners].any(axis=1))
 
-    @cached_property
-    def _folded(self) -> VertexFlags:
-        """Vertices from which states move like the root of the way."""
-        return are_singular(self.eset.kinds) & self.coordinates.projecting
-
     def find(self, points: Points) -> Found:
         """States of the cells that have the coordinates of points."""
+        if self.coordinates.projecting:
+            return self._over(points)
         parts = [self._some(points[at : at + CHUNK], at) for at in range(0, len(points), CHUNK)]
         if not parts:
             nothing = np.zeros(0, int)
             return Found(self.eset.points[nothing], nothing, nothing, nothing > 0)
         z, p, point, cell, inside = (np.concatenate(column) for column in zip(*parts, strict=True))
         return Found(States(self.eset.structure, z, p), point, cell, inside)
+
+    def _over(self, points: Points) -> Found:
+        """States over points of the box: those that the set has there and that lie on the cells."""
+        eset, setting = self.eset, self.coordinates.setting
+        p = np.repeat(eset.points.p[:1], len(points), axis=0)
+        p[:, self.coordinates.places] = points
+        within = np.flatnonzero(eset.box.holds(p[:, setting.free], slack=SLACK))
+        states, point, cell = eset.sheets.over(p[within])
+        own = np.zeros(len(eset.cells) + 1, bool)
+        own[self.numbers] = True
+        kept = np.flatnonzero(own[cell])
+        return Found(states[kept], within[point[kept]], cell[kept], np.ones(len(kept), bool))
 
     @cached_property
     def over_vertices(self) -> tuple[Some, Found]:
@@ -234,9 +237,6 @@ class Cells:
         weights = np.maximum(hits.weights, 0.0)
         weights /= weights.sum(axis=1, keepdims=True)
         corners = self.corners[hits.cell]
-        folded = self._folded[corners]
-        some = np.flatnonzero(folded.any(axis=1) & ~folded.all(axis=1))
-        weights[some] = root_weights(weights[some], folded[some])
         z, p = (
             np.einsum("hk,hki->hi", weights, column[corners])
             for column in (self.eset.points.z, self.eset.points.p)
@@ -316,7 +316,7 @@ class Cells:
     def _again(
         self, hits: Hits, z: Lanes, p: Parameters, good: Flags, again: Items, points: Points
     ) -> tuple[Lanes, Parameters, Flags]:
-        """Try undecided hits from regular corners of their cells, by lifts or by Newton.
+        """Try undecided hits from regular corners of their cells.
 
         From the nearest one; if the cell contains the point, from all.
         """
@@ -339,16 +339,7 @@ class Cells:
         self, corner: Numbers, wanted: Float[np.ndarray, "lanes d"], hits: Hits
     ) -> tuple[Lanes, Parameters, Flags]:
         start = self.eset.points[corner]
-        if not self.coordinates.projecting:
-            return self._polish(start.z, start.p, hits, wanted)
-        velocity = np.zeros_like(start.p)
-        velocity[:, self.coordinates.places] = wanted - start.p[:, self.coordinates.places]
-        line = ParameterLine(self.eset.structure, start.p.copy(), velocity)
-        ended = trace(line, start.z.copy(), (), TraceOptions(record=False))
-        arrived = ended.code == EventCode.ARRIVED
-        p = start.p + velocity
-        index = np.where(arrived, ended.index, -1)
-        return ended.z, p, self._in_cells(ended.z, p, arrived, index, hits.cell)
+        return self._polish(start.z, start.p, hits, wanted)
 
     def one_of_each(self, z: Lanes, p: Parameters, hits: Hits) -> Int[np.ndarray, " kept"]:
         """One of the equal states over each point, rather from a cell that contains the point.

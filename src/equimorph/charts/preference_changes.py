@@ -84,6 +84,14 @@ class Straight:
         beside = np.minimum(high, 1.0 - low) <= 1.01 * self._at_cusp
         return np.where(self.on_folds & beside, self._at_cusp, LOCATED)
 
+    def ends_at_cusps(self, share: ItemValues) -> Items:
+        """Which end of each edge, 0 or 1, a change on a fold is no farther from than a cusp; or −1.
+
+        At the cusp itself the states that rules tell apart are one.
+        """
+        near = np.minimum(share, 1.0 - share) <= 1.01 * self._at_cusp
+        return np.where(self.on_folds & near, np.rint(share).astype(int), -1)
+
     def changes(
         self, preference: Preference, lanes: Items, span: Float[np.ndarray, "n 2"], first: ItemFlags
     ) -> Float[np.ndarray, "n k"]:
@@ -127,10 +135,12 @@ class Straight:
 
 def locate_changes(
     preference: Preference, way: Straight, values: Float[np.ndarray, "n 2"]
-) -> tuple[ItemFlags, Vertices]:
+) -> tuple[ItemFlags, Vertices, Items]:
     """Vertices on edges where the preference changes first on the way from their first ends.
 
-    All edges are divided together: a batch of paths takes less than several small ones.
+    Changes at cusps have no vertices of their own: for these edges the end that is the cusp is
+    told, −1 for others. All edges are divided together: a batch of paths takes less than several
+    small ones.
     """
     low, high = np.zeros(len(way.ends)), np.ones(len(way.ends))
     first: ItemFlags = values[:, 0] < 0.0
@@ -155,11 +165,14 @@ def locate_changes(
         low[wide[sure]] = high[wide[sure]] = exact[sure]
         unknown = ~good[every, np.minimum(passed, good.shape[1] - 1)]
         todo = np.setdiff1d(todo, wide[unknown])
-    done = np.zeros(len(way.ends), bool)
-    z, p, good = way.states(todo, 0.5 * (low + high)[todo])
+    share, done = 0.5 * (low + high), np.zeros(len(way.ends), bool)
+    at_cusp = np.full(len(way.ends), -1)
+    at_cusp[todo] = way.ends_at_cusps(share)[todo]
+    todo = todo[at_cusp[todo] < 0]
+    z, p, good = way.states(todo, share[todo])
     done[todo[good]] = True
     own = way.ends[done], way.index[done]
-    return done, _vertices(way.fabric, *own, z[good], p[good])
+    return done, _vertices(way.fabric, *own, z[good], p[good]), at_cusp
 
 
 def _compare(

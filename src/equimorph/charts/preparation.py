@@ -112,7 +112,13 @@ def _with_cusps(eset: EquilibriumSet) -> EquilibriumSet | None:
     folded = on_fold(eset.kinds)
     excerpt = excerpt_of(eset, count_corners(folded, eset.cells) >= len(eset.names), folded)
     fabric, cusps = add_cusp_vertices(excerpt, excerpt.fabric)
-    return whole_set(excerpt.put_back(fabric)) if len(cusps) else None
+    if len(cusps) == 0:
+        return None
+    # straight sides of cells at a cusp may pass it on its wrong side
+    whole = whole_set(excerpt.put_back(fabric))
+    fixed = facets_of((*whole.folds, *whole.crossings), 2)
+    cells = flip_inverted_triangles(whole.cells, whole.coordinates, fixed, whole.stratum)
+    return replace(whole, cells=cells)
 
 
 def flip_inverted_triangles(

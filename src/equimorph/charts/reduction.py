@@ -242,7 +242,9 @@ class _Crossings:
             np.minimum.at(lowest, side, fabric.cell_index)
         self._base = len(fabric.vertices)
         way = Straight(fabric, ends[crossed], marks[crossed], lowest[crossed])
-        done, self._found = locate_changes(preference, way, values[ends[crossed]])
+        done, self._found, cusp = locate_changes(preference, way, values[ends[crossed]])
+        changed = np.flatnonzero(cusp >= 0)
+        values[way.ends[changed, cusp[changed]]] = 0.0
         self._keys = keys_of(way.ends[done], self._base)
 
     def between(
@@ -267,6 +269,8 @@ def _signs(preference: Preference) -> Float[np.ndarray, " V"]:
     states, scored = eset.points[used], preference.choice.score is not None
     found = preference.cells.over_vertices[1] if scored else None
     values[used] = np.where(preference.prefers(states.z, states.p, found), -1.0, 1.0)
+    if scored:  # scores of states on folds are as good as others
+        return values
     folded = on_fold(eset.kinds)
     # paths to a fold end just before it or there: look a little way off
     doubtful = used[folded[used] & (values[used] > 0.0)]

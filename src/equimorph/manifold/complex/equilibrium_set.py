@@ -190,7 +190,7 @@ class EquilibriumSet(Tabular):
     @check_arguments
     def at(self, **at: float) -> States:
         """Exact states over one point of the box, sorted by energy; see `over`."""
-        states = self._sheets.over(self._parameters(at)[None])[0]
+        states = self.sheets.over(self._parameters(at)[None])[0]
         return states[np.argsort(states.energy, kind="stable")] if len(states) > 1 else states
 
     @check_arguments
@@ -214,7 +214,7 @@ class EquilibriumSet(Tabular):
             point lies outside the box.
         """
         p = self._parameters_over(at)
-        states, point, cell = self._sheets.over(p)
+        states, point, cell = self.sheets.over(p)
         known = cell >= 0
         stratum, component = (
             np.where(known, label[cell], -1) if len(label) else cell
@@ -233,7 +233,7 @@ class EquilibriumSet(Tabular):
         states
             Equilibria over points of the box, within the constraints of the set.
         """
-        return self._sheets.holding(states)
+        return self.sheets.holding(states)
 
     def _parameters_over(
         self, at: Mapping[str, Float[np.ndarray, " points"]]
@@ -255,7 +255,7 @@ class EquilibriumSet(Tabular):
         return self.setting.parameters(points)
 
     @cached_property
-    def _sheets(self) -> Sheets:
+    def sheets(self) -> Sheets:
         """The cells, made ready for queries."""
         caps = [piece.vertices for piece in self.boundaries if piece.kind != BoundaryKind.BOX]
         folded, capped = np.zeros((2, len(self.points)), bool)
