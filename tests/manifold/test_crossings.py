@@ -30,6 +30,7 @@ from oracles.surfaces import (
     three_planes,
     transcriticals,
     tricritical,
+    tricritical_beside_cusp,
 )
 from typecheck import unchecked
 
@@ -165,6 +166,40 @@ def test_hilltops_are_found_on_crossings_that_bend(k, bend, grid):
     assert eset.audit.bisected == 0
     hub = np.intersect1d(eset.folds[0], eset.crossings[0])
     np.testing.assert_allclose(eset.coordinates[hub], [[0.0, 0.0]], atol=1e-3)
+
+
+@pytest.mark.parametrize("grid", [(3, 3), (4, 5)])
+@pytest.mark.parametrize("soft", [1e-2, 1e-4])
+def test_hilltops_are_found_where_another_eigenvalue_is_small_all_around(soft, grid):
+    """The hilltop of a soft sheet, whose eigenvalue 2 soft s vanishes on the fold.
+
+    Between known points of the crossing this is the smallest eigenvalue. With its null vector
+    Newton's method left the crossing: 4 to 12 triangles were bisected here.
+    """
+    eset = lifted(hilltop(2.5, 1.5, soft), BOX, intervals=grid)
+    assert_faithful(eset)
+    assert_crossings(eset)
+    assert eset.audit.bisected == 0
+    hub = np.intersect1d(eset.folds[0], eset.crossings[0])
+    np.testing.assert_allclose(eset.coordinates[hub], [[0.0, 0.0]], atol=1e-3)
+
+
+@pytest.mark.parametrize("grid", [(2, 2), (3, 3)])
+def test_folds_leave_pitchforks_in_triangles_with_other_folds(grid):
+    """x (y³ − 0.6 y² + b y − a), y = x²: the hub at 0, the cusp at b = 0.12.
+
+    The polygon around the hub has a pair of folds more. It was bisected until they were parted: 8
+    and 9 triangles.
+    """
+    eset = lifted(tricritical_beside_cusp(0.6), BOX, intervals=grid)
+    assert_faithful(eset)
+    assert_crossings(eset)
+    assert (eset.audit.bisected, len(eset.crossings), len(eset.folds)) == (0, 1, 1)
+    y, b = eset.points.z[:, 0] ** 2, eset.points["b"]
+    folded = eset.folds[0]
+    np.testing.assert_allclose(b[folded], 1.2 * y[folded] - 3 * y[folded] ** 2, atol=1e-8)
+    hub = np.intersect1d(folded, eset.crossings[0])
+    np.testing.assert_allclose(eset.coordinates[hub], [[0.0, 0.0]], atol=1e-9)
 
 
 @pytest.mark.slow

@@ -5,9 +5,12 @@ import pytest
 from hypothesis import given, strategies as st
 
 from equimorph.manifold.lifting.polygon_cuts import (
+    MEETING,
+    TURN,
     chords_to_split,
     cut,
     has_triangulation,
+    match_around_hub,
     match_folds,
     triangulate,
 )
@@ -20,6 +23,15 @@ def matched(index_or_fold):
     kinds = dict(enumerate(index_or_fold))
     return match_folds(
         list(kinds), lambda point: kinds[point] == "F", lambda point: int(kinds[point])
+    )
+
+
+def matched_around_hub(index_or_sort):
+    """Match around a hub, with "F" for folds and "C" for points of crossings."""
+    kinds = dict(enumerate(index_or_sort))
+    sorts = {"F": TURN, "C": MEETING}
+    return match_around_hub(
+        list(kinds), lambda point: sorts.get(kinds[point], 0), lambda point: int(kinds[point])
     )
 
 
@@ -54,6 +66,27 @@ def test_change_of_index_without_a_fold_contradicts_itself():
 
 def test_two_neighbouring_folds_contradict_themselves():
     assert matched([0, "F", "F", 1]) == []
+
+
+def test_fold_and_crossing_that_follow_in_turn_meet_in_a_hub():
+    assert matched_around_hub([0, "C", 0, "F", 1, "C", 1, "F"]) == [[(1, 5), (3, 7)]]
+
+
+def test_fold_that_parts_equal_indices_meets_no_crossing():
+    assert matched_around_hub([0, "C", 0, "F", 0, "C", 0, "F"]) == []
+
+
+def test_fold_beside_a_hub_may_be_any_of_three():
+    """The other two are joined."""
+    polygon = [0, "C", 0, "F", 1, "F", 0, "F", 1, "C", 1, "F"]
+    assert matched_around_hub(polygon) == [
+        [(1, 9), (3, 5), (7, 11)],
+        [(1, 9), (3, 11), (5, 7)],
+    ]
+
+
+def test_folds_that_need_no_hub_have_none():
+    assert matched_around_hub([0, "C", 0, "F", 1, "F", 0, "C"]) == []
 
 
 def test_four_folds_of_three_indices_have_one_way():

@@ -86,13 +86,26 @@ def tricritical(cubic: float) -> Polynomial:
     return Polynomial(lambda x, a, b: integral(x**5 + cubic * b * x**3 - a * x), 1, ("a", "b"))
 
 
-def hilltop(k: float, bend: float = 0.0) -> Polynomial:
-    """s² + k x² (1 + 3 bend s²) = a, x (s + bend s³ − b) = 0: the fold of the sheet x = 0.
+def tricritical_beside_cusp(turn: float) -> Polynomial:
+    """x (y³ − turn y² + b y − a) with y = x²: folds a = y³ − turn y² + b y, b = 2 turn y − 3 y².
 
-    It passes its pitchforks, b = s + bend s³, a = s², at b = 0. The other sheet has no fold.
+    They leave the pitchforks a = 0 at b = 0 and turn back at the cusp y = turn/3.
     """
     return Polynomial(
-        lambda s, x, a, b: s**3 * (1 / 3) + k * x**2 * (s + bend * s**3 - b) - a * s, 2, ("a", "b")
+        lambda x, a, b: integral(x**7 - turn * x**5 + b * x**3 - a * x), 1, ("a", "b")
+    )
+
+
+def hilltop(k: float, bend: float = 0.0, soft: float = 1.0) -> Polynomial:
+    """s² + (k/soft) x² (1 + 3 bend s²) = a, x (s + bend s³ − b) = 0: the fold of the sheet x = 0.
+
+    It passes its pitchforks, b = s + bend s³, a = s², at b = 0. The other sheet has no fold. The
+    eigenvalue that vanishes on the fold is 2 soft s.
+    """
+    return Polynomial(
+        lambda s, x, a, b: soft * (s**3 * (1 / 3) - a * s) + k * x**2 * (s + bend * s**3 - b),
+        2,
+        ("a", "b"),
     )
 
 

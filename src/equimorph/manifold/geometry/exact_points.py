@@ -89,6 +89,9 @@ class Aim(Columns):
         sought from the middles on.
     tangents
         Bases of spaces near the tangent spaces, where they are known.
+    border
+        Unit vectors near the null vectors at crossings, where they are known. At a guess another
+        eigenvalue may be the smallest one.
     """
 
     setting: Setting
@@ -99,6 +102,7 @@ class Aim(Columns):
     rows: Float[np.ndarray, "lanes m coordinates"]
     crossing: bool = False
     tangents: Rows | None = None
+    border: Lanes | None = None
 
     @property
     def plain(self) -> bool:
@@ -215,7 +219,7 @@ def _settle_guarded(
         index=index,
         within=setting.constraints,
     )
-    frame: Planes | Tangents = Tangents(unfolded=aim.crossing)
+    frame: Planes | Tangents = Tangents(unfolded=aim.crossing, border=aim.border)
     if tangents is not None and not aim.crossing:
         frame = Planes(*aim.products(tangents))
     return settle(setting.structure, z, p, aim.directions, aim.conditions(*centre), guards, frame)
@@ -224,7 +228,8 @@ def _settle_guarded(
 def _crosses(aim: Aim, z: Lanes, p: Parameters) -> Flags:
     """Whether sheets cross at points, rather than touch, and these are equilibria."""
     structure = aim.setting.structure
-    known = reduction(structure, z, p, null_border(structure, z, p), aim.directions)
+    border = null_border(structure, z, p) if aim.border is None else aim.border
+    known = reduction(structure, z, p, border, aim.directions)
     small = np.abs(structure.residual(z, p)).max(axis=1, initial=0.0) < RESIDUAL
     return np.asarray(known.crosses & small)
 

@@ -18,7 +18,7 @@ from equimorph.manifold.geometry.exact_points import Aim, Pinned, correct_points
 from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.lifting.pairing import Pairing
-from equimorph.manifold.lifting.polygon_cuts import MEETING, TURN, Chord, Plan, chord_of, planes
+from equimorph.manifold.lifting.polygon_cuts import MEETING, Chord, Plan, crossed_chords, planes
 
 Ways = list[list[Chord]]
 
@@ -45,7 +45,7 @@ def join_crossings(plans: list[Plan], ways: list[Ways]) -> list[Ways]:
     """Ways to cut polygons that agree on the chords along which their sheets cross."""
     ways, groups = list(ways), _by_triangle(plans)
     for own in groups.values():
-        choices = [ways[k] or _around_a_hub(plans[k]) for k in own]
+        choices = [ways[k] for k in own]
         size = int(np.prod([len(each) for each in choices]))
         fitting = [
             combination
@@ -66,15 +66,6 @@ def _by_triangle(plans: list[Plan]) -> dict[int, list[int]]:
     return groups
 
 
-def _around_a_hub(plan: Plan) -> Ways:
-    """Chord of the crossing if fold points and crossings follow each other in turn."""
-    singular = [point for point in plan.points if plan.singular(point)]
-    kinds = [plan.singular(point) for point in singular]
-    met = plan.those(MEETING)
-    in_turn = kinds in ([TURN, MEETING] * SHEETS, [MEETING, TURN] * SHEETS)
-    return [[chord_of(*met)]] if in_turn else []
-
-
 def _agree(plans: list[Plan], ways: Iterable[list[Chord]]) -> bool:
     """Whether each chord between crossings is that of two polygons."""
     count: dict[Chord, int] = {}
@@ -89,8 +80,11 @@ def put_hubs(pairing: Pairing, plans: list[Plan]) -> set[int]:
     """Lead folds that cross a chord of a crossing through a hub; return triangles without one."""
     lost: set[int] = set()
     plans = [plan for plan in plans if VertexKind.CROSSING in plan.kinds.values()]
-    for hub in [plan for plan in plans if plan.those(TURN) and _join(plan) < _singular(plan)]:
-        triangle, chord = hub.polygon.triangle, hub.chords[0]
+    for hub in plans:
+        crossed = crossed_chords(hub)
+        if crossed is None:
+            continue
+        (chord, fold), triangle = crossed, hub.polygon.triangle
         point = _hub(pairing, triangle, chord)
         if point is None:
             lost.add(triangle)
@@ -98,16 +92,9 @@ def put_hubs(pairing: Pairing, plans: list[Plan]) -> set[int]:
         for plan in plans:
             if plan.polygon.triangle == triangle and chord in plan.chords:
                 plan.middle[chord] = point
-        hub.chords = [chord, *((fold, point) for fold in hub.those(TURN))]
+        others = [each for each in hub.chords if each not in crossed]
+        hub.chords = [chord, *((end, point) for end in fold), *others]
     return lost
-
-
-def _join(plan: Plan) -> int:
-    return 2 * len(plan.chords)
-
-
-def _singular(plan: Plan) -> int:
-    return len(plan.those(TURN)) + len(plan.those(MEETING))
 
 
 def split_crossings(pairing: Pairing, plans: list[Plan], chords: set[Group]) -> list[int]:
@@ -176,7 +163,7 @@ def _hub(pairing: Pairing, triangle: int, chord: Chord) -> int | None:
 
     def test(share: float) -> float:
         middle = (place[0] + share * way)[None]
-        aim = Aim(setting, False, False, span, middle, rows, crossing=True)
+        aim = Aim(setting, False, False, span, middle, rows, crossing=True, border=sense[None])
         pinned = correct_points(aim, *_guess(known, share), np.array([length]))
         if not pinned.found[0]:
             raise _NoCrossingError
@@ -235,9 +222,12 @@ def _coefficients(
     p: Float[np.ndarray, "n P"],
     sense: Float[np.ndarray, " size"],
 ) -> tuple[ItemValues, ItemValues]:
-    """Quadratic and cubic coefficient with null vectors that do not point against `sense`."""
+    """Quadratic and cubic coefficient with the null vectors that belong to `sense`.
+
+    Near a hub another one is as good a null vector.
+    """
     structure, n = pairing.setting.structure, pairing.setting.structure.unknowns
-    b = null_border(structure, z, p)
-    norm = np.sqrt(b[:, :n] ** 2 @ structure.mass)
-    at = Critical(structure, z, p, np.ascontiguousarray(b * norm[:, None]))
-    return at.quadratic * np.sign(at.v @ sense), at.cubic
+    v = Critical(structure, z, p, np.tile(sense, (len(z), 1))).v
+    norm = np.sqrt(v[:, :n] ** 2 @ structure.mass) / (v**2).sum(axis=1)
+    at = Critical(structure, z, p, np.ascontiguousarray(v * norm[:, None]))
+    return at.quadratic, at.cubic

@@ -31,6 +31,7 @@ from equimorph.manifold.lifting.polygon_cuts import (
     chord_of,
     chords_to_split,
     cut,
+    match_around_hub,
     match_folds,
     planes,
     triangulate,
@@ -197,12 +198,17 @@ def _through(plan: Plan) -> int:
     return VertexKind.CAP if _same_side(plan, (plan.points[0], plan.points[-1])) else 0
 
 
+def _ways(pairing: Pairing, plan: Plan) -> list[list[Chord]]:
+    """Ways to join the folds of a polygon, around a hub if there are no others."""
+    index = pairing.points.index.__getitem__
+    ways = match_folds(plan.points, plan.singular, index)
+    crossed = not ways and plan.those(MEETING) and plan.those(TURN)
+    return match_around_hub(plan.points, plan.singular, index) if crossed else ways
+
+
 def _join_folds(pairing: Pairing, plans: list[Plan], found: _Found) -> list[Plan]:
     """Decide which folds of each polygon belong together; return plans where that is certain."""
-    index = pairing.points.index
-    ways = [
-        match_folds(plan.points, plan.singular, lambda point: int(index[point])) for plan in plans
-    ]
+    ways = [_ways(pairing, plan) for plan in plans]
     several = [k for k, each in enumerate(ways) if len(each) > 1]
     continuous = continuous_ways(pairing, [plans[k] for k in several], [ways[k] for k in several])
     for k, each in zip(several, continuous, strict=True):

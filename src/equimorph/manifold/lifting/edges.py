@@ -1,6 +1,8 @@
 """Lift grid edges: by one verified step, or by pseudo-arclength in ever finer steps.
 
 A fold on a traced edge becomes a vertex of the set, exactly as the trace located it.
+
+See docs/decisions.md, "An attempt to lift an edge counts once".
 """
 
 from dataclasses import dataclass, replace
@@ -120,9 +122,9 @@ def _trace(pairing: Pairing, rays: Rays, line: ParameterLine, effort: int) -> No
         look_inside=effort > 0,
     )
     traced = _follow(pairing, rays, line, options)
-    np.add.at(pairing.effort, rays.edges[~traced.good], 1)
+    pairing.effort[rays.edges[~traced.good]] = effort + 1
     ends = _ends(pairing, traced)
-    curves = _enter(pairing, rays, np.flatnonzero(traced.good), ends)
+    curves = _enter(pairing, rays, np.flatnonzero(traced.good), ends, effort)
     inside = traced.inside.take(curves[traced.inside.lanes] >= 0)
     numbers = _number(pairing, inside, rays.edges[inside.lanes]).tolist()
     lanes, starts = np.unique(inside.lanes, return_index=True)
@@ -134,7 +136,7 @@ def _trace(pairing: Pairing, rays: Rays, line: ParameterLine, effort: int) -> No
     pairing.fit()
 
 
-def _enter(pairing: Pairing, rays: Rays, good: Items, ends: Numbers) -> Numbers:
+def _enter(pairing: Pairing, rays: Rays, good: Items, ends: Numbers, effort: int) -> Numbers:
     """Enter the curves of good rays; return the number of that of each ray, −1 if there is none."""
     curves = np.full(len(ends), -1)
     curves[good] = pairing.enter_at_once(rays.take(good), ends[good])
@@ -143,7 +145,7 @@ def _enter(pairing: Pairing, rays: Rays, good: Items, ends: Numbers) -> Numbers:
         known = pairing.ray(point, edge)
         if known >= 0 and (end < 0 or pairing.other_end(known, point) == end):
             continue  # the same curve, traced from its other end in the same batch
-        curves[lane] = pairing.enter(point, edge, end)
+        curves[lane] = pairing.enter(point, edge, end, tried=effort)
     return curves
 
 

@@ -246,18 +246,20 @@ class Pairing:
         from_first[edges[sides == 0]] = True
         return Rays(points, edges, sides).take((sides == 0) | ~from_first[edges])
 
-    def enter(self, point: int, edge: int, end: int, inner: Sequence[int] = ()) -> int:
+    def enter(
+        self, point: int, edge: int, end: int, inner: Sequence[int] = (), tried: int = 0
+    ) -> int:
         """Register a curve; return its number, −1 if it is known or contradicts another one.
 
-        Contradictions take back what they contradict and raise the effort.
+        Contradictions take back what they contradict. `tried` is the effort with which the curve
+        was lifted.
         """
         known = self.ray(point, edge)
         if known >= 0 and self.other_end(known, point) == end:
             return -1
         taken = end >= 0 and self.ray(end, edge) >= 0
         if known >= 0 or taken or end == point:
-            self.conflicts += 1
-            self.effort[edge] += 1
+            self.contradict(edge, tried)
             for curve in {known, self.ray(end, edge) if end >= 0 else -1}:
                 if curve >= 0:
                     self.forget(curve)
@@ -267,6 +269,15 @@ class Pairing:
         if end >= 0:
             self.set_ray(end, edge, curve)
         return curve
+
+    def contradict(self, edge: int, tried: int) -> None:
+        """Count a contradiction; the next effort on its edge is the one after that tried.
+
+        Curves that were lifted together may contradict each other many times. All of them have had
+        one attempt: each further one is to have its turn.
+        """
+        self.conflicts += 1
+        self.effort[edge] = max(self.effort[edge], tried + 1)
 
     def enter_at_once(self, rays: Rays, ends: Items) -> Items:
         """Register curves where nothing is known; return their numbers, −1 for those left over.

@@ -6,6 +6,7 @@ See docs/decisions.md, "Folds and constraints are built into the cells".
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cache, lru_cache
+from itertools import chain, combinations, product
 
 import numpy as np
 
@@ -23,6 +24,8 @@ MOST_FOLDS = 16
 as many."""
 REGULAR, TURN, MEETING = 0, 1, 2
 """What the points of polygons are."""
+SORTS = MEETING, TURN
+"""Of points that are joined by chords."""
 
 
 def match_folds(
@@ -79,6 +82,51 @@ def _matchings(folds: list[int], arcs: list[int], kinds: dict[int, int]) -> list
         return found
 
     return ways(0, len(folds), arcs[-1])
+
+
+def match_around_hub(
+    polygon: Sequence[int], singular: Callable[[int], int], index: Callable[[int], int]
+) -> list[list[Chord]]:
+    """All ways to join folds where one of them crosses the chord of a crossing: they meet in a hub.
+
+    The polygon is parted at the ends of the two chords that cross, and each part, which reaches as
+    far as the hub, is joined by itself. The index differs on both sides of the fold. See
+    `match_folds`.
+    """
+    found: list[list[Chord]] = []
+    at = {sort: [k for k, each in enumerate(polygon) if singular(each) == sort] for sort in SORTS}
+    for ends, turns in product(*(list(combinations(at[sort], 2)) for sort in SORTS)):
+        order = sorted((*ends, *turns))
+        if (order[0] in ends) == (order[2] in ends) != (order[1] in ends) == (order[3] in ends):
+            doubled = [*polygon, *polygon]
+            stops = [*order[1:], order[0] + len(polygon)]
+            parts = [doubled[a + 1 : b] for a, b in zip(order, stops, strict=True)]
+            own = [match_folds(part, singular, index) for part in parts]
+            if all(own) and _are_parted(parts, [order[0] in turns, order[1] in turns], index):
+                chords = [chord_of(polygon[a], polygon[b]) for a, b in (ends, turns)]
+                found += [sorted([*chords, *chain(*way)]) for way in product(*own)]
+    return sorted(found)
+
+
+def _are_parted(
+    parts: Sequence[Sequence[int]], turns: Sequence[bool], index: Callable[[int], int]
+) -> bool:
+    """Whether the index of parts around a hub changes where they begin with a fold."""
+    own = [index(part[0]) for part in parts]
+    return all(own[k] != own[k - 1] for k in range(len(parts)) if turns[k % 2])
+
+
+def crossed_chords(plan: "Plan") -> tuple[Chord, Chord] | None:
+    """Chord of a crossing and that of the fold that crosses it, if there are such."""
+    place = {point: k for k, point in enumerate(plan.points)}
+    by_sort: list[list[Chord]] = [
+        [chord for chord in plan.chords if plan.singular(chord[0]) == sort] for sort in SORTS
+    ]
+    for met, fold in product(*by_sort):
+        low, high = sorted(place[end] for end in met)
+        if sum(low < place[end] < high for end in fold) == 1:
+            return met, fold
+    return None
 
 
 def cut(polygon: Sequence[int], chords: Sequence[Chord], middle: dict[Chord, int]) -> list[Piece]:

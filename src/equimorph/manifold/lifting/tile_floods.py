@@ -99,6 +99,7 @@ class FloodGlue:
         for curve in self._part.curves[found.dead].tolist():
             whole.forget(curve)
         whole.effort[tile.edges] = np.maximum(whole.effort[tile.edges], found.effort)
+        tried = whole.effort.copy()
         whole.conflicts += int(found.conflicts.sum())
         edges, start, end = found.curves.T
         at_once = (found.amount == 0) & (end >= 0) & ~tile.shared[edges]
@@ -110,14 +111,14 @@ class FloodGlue:
         for curve in np.flatnonzero(~at_once).tolist():
             inner = found.inner[first[curve] : first[curve] + found.amount[curve]]
             edge, near, far = found.curves[curve].tolist()
-            self._enter_alone(edge, near, far, inner.tolist())
+            self._enter_alone(edge, near, far, inner.tolist(), tried)
         for point, edge in found.abandoned.tolist():
             near_point, whole_edge = int(self._numbers[point]), int(tile.edges[edge])
             if whole.ray(near_point, whole_edge) < 0:
                 whole.set_ray(near_point, whole_edge, RayMark.ABANDONED)
         whole.looked_at = len(whole.curves.edge)
 
-    def _enter_alone(self, edge: int, start: int, end: int, inner: list[int]) -> None:
+    def _enter_alone(self, edge: int, start: int, end: int, inner: list[int], tried: Items) -> None:
         """Enter a curve, unless it is known; take it back if other points inside are known."""
         whole, edge = self._whole, int(self._part.tile.edges[edge])
         start, end = int(self._numbers[start]), int(self._numbers[end]) if end >= 0 else -1
@@ -127,11 +128,11 @@ class FloodGlue:
             there = there if whole.curves.start[known] == start else there[::-1]
             kinds = self._found.points.kind[[each - self._known for each in inner]]
             if _singular(whole.points.kind[there]) != _singular(kinds):
-                whole.conflicts += 1
-                whole.effort[edge] += 1
+                whole.contradict(edge, int(tried[edge]))
                 whole.forget(known)
             return
-        whole.enter(start, edge, end, [self._number(point, edge) for point in inner])
+        own = [self._number(point, edge) for point in inner]
+        whole.enter(start, edge, end, own, int(tried[edge]))
         whole.fit()
 
     def _number(self, point: int, edge: int) -> int:
