@@ -238,18 +238,14 @@ def nodes_with_ends(eset: EquilibriumSet, ends: Ends) -> States:
 
 def end_links(eset: EquilibriumSet, ends: Ends, demands: Demands) -> tuple[Pairs, Values]:
     """Links of start and goal to the vertices around them, and to each other."""
-    count = len(eset.points)
-    allowed = network_of(eset).admissible(eset, demands)
-    pairs, costs = [], []
-    for number, end in enumerate(ends):
-        near, cost = neighbours(eset, allowed, end, demands)
-        pairs.append(np.stack([np.full(len(near), count + number), near], axis=1))
-        costs.append(cost)
-    direct, cost = connect(ends[0].batch, ends[1].batch, demands)
-    if direct[0]:
-        pairs.append(np.array([[count, count + 1]]))
-        costs.append(cost)
-    return np.concatenate(pairs), np.concatenate(costs)
+    count, allowed = len(eset.points), network_of(eset).admissible(eset, demands)
+    near = [np.flatnonzero(allowed & vertices_around(eset, end)) for end in ends]
+    own = np.repeat([0, 1, 0], [*map(len, near), 1])
+    source = join_states(eset.structure, ends)[own]
+    target = join_states(eset.structure, (eset.points[np.concatenate(near)], ends[1]))
+    linked, cost = connect(source, target, demands)
+    pairs = np.stack([count + own, np.concatenate([*near, [count + 1]])], axis=1)
+    return pairs[linked], cost[linked]
 
 
 def neighbours(
