@@ -41,6 +41,7 @@ export class App {
   private colourChoice!: HTMLSelectElement;
   private sliceSlider: HTMLInputElement | null = null;
   private sliceText = h("output");
+  private goFields: HTMLInputElement[] = [];
   private above = false;
   private linkTimer = 0;
   private readonly appearance = new Appearance(() => this.view.setTheme(this.appearance.colours));
@@ -100,10 +101,17 @@ export class App {
   }
 
   private goTo(): HTMLElement {
-    const inputs = this.set.words.parameters.map((p) => h("input", { type: "number", step: "any", min: p.lower, max: p.upper, value: Number(((p.lower + p.upper) / 2).toPrecision(3)), "aria-label": label(p.name, p.unit) }));
+    const inputs = this.set.words.parameters.map((p) => h("input", { type: "number", step: "any", min: p.lower, max: p.upper, "aria-label": label(p.name, p.unit) }));
+    this.goFields = inputs;
     const form = h("form", { class: "row go", submit: (event: Event) => { event.preventDefault(); this.goToPoint(inputs.map((each) => Number(each.value))); } },
       ...inputs.flatMap((input, a) => [h("label", {}, `${this.set.words.parameters[a].name} `, input)]), h("button", { type: "submit" }, "Go there"));
     return form;
+  }
+
+  /** The fields of "Go there" show where the present pin stands. */
+  private showPlace(): void {
+    if (!this.spot) return;
+    this.set.parameters(this.spot).forEach((x, a) => { this.goFields[a].value = String(Number(x.toPrecision(4))); });
   }
 
   private drawLegend(): void { this.legend.replaceChildren(...legend(this.set, this.view)); }
@@ -271,6 +279,7 @@ export class App {
     this.shape.show(portraits);
     this.numbers.replaceChildren(numbersTable(this.set, columns, (k) => this.unpin(k)));
     if (this.spot && !this.hover) {
+      this.showPlace();
       const snap = this.landing?.spot ? [h("button", { type: "button", click: () => this.followSnap() }, "Follow the snap")] : [];
       this.list.replaceChildren(equilibriaList(this.set, this.spot, this.view.height, (spot) => this.stand(spot, "arrived", null)), ...snap);
     }

@@ -100,6 +100,14 @@ def test_as_many_states_are_listed_as_there_are(spring):
     assert found == np.where(np.abs(places[clear, 1]) < fold[clear], 3, 1).tolist()
 
 
+def test_the_fields_of_go_there_show_where_the_pin_stands(spring):
+    """They showed the middle of the box, wherever the pin was."""
+    fields = "() => [...document.querySelectorAll('.go input')].map((each) => Number(each.value))"
+    for place in ([0.8, 0.05], [1.2, -0.1]):
+        spring("(p) => explorer.goToPoint(p)", place)
+        assert spring(fields)[:2] == pytest.approx(place)
+
+
 def test_the_tree_of_energies_is_that_of_the_closed_form(spring):
     """Both minima are joined ½ (1 − x_l)² above them, at F = 0; beyond x_l = 1 there is one."""
     spring("explorer.goToPoint([0.8, 0.0])")

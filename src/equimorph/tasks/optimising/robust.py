@@ -44,8 +44,9 @@ class RobustOptimum:
     value
         The objective there, without imperfections.
     guaranteed
-        Its worst value over the box. At the edge of stability the least upper bound: the limit
-        from inside.
+        Its worst value at the state and at the corners of the box; inside the box an objective that
+        turns there, like a square about a target, may be worse. At the edge of stability the least
+        upper bound: the limit from inside.
     at_risk
         Worst value over the box around the nominal optimum; infinite if stability is lost.
     edge
