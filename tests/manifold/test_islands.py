@@ -1,5 +1,6 @@
 """Closed folds and pitchfork curves inside cells, which no edge of the grid meets: closed forms."""
 
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
@@ -214,3 +215,18 @@ def test_places_become_vertices_of_the_grid(d):
             assert len(mesh.vertices) < known + 40
         counts.append(len(mesh.vertices) - known)
     assert np.median(counts) == d
+
+
+@pytest.mark.parametrize("kind", ["strip", "lips"])
+def test_islands_are_found_by_determinants_beyond_the_range_of_numbers(kind, monkeypatch):
+    """Those of many unknowns: here of the same islands, times 2^6000. Same cells, bit for bit."""
+    known, advance = island(0, kind), em.EnergyStructure.advance
+
+    def scaled(*given):
+        step = advance(*given)
+        return replace(step, determinant=step.determinant + [0.0, 6000.0])
+
+    monkeypatch.setattr(em.EnergyStructure, "advance", scaled)
+    found = island(0, kind)
+    np.testing.assert_array_equal(found.points.z, known.points.z)
+    np.testing.assert_array_equal(found.cells, known.cells)
