@@ -224,7 +224,7 @@ def test_islands_are_found_by_determinants_beyond_the_range_of_numbers(kind, mon
 
     def scaled(*given):
         step = advance(*given)
-        return replace(step, determinant=step.determinant + [0.0, 6000.0])
+        return replace(step, determinant=step.determinant + np.array([0.0, 6000.0]))
 
     monkeypatch.setattr(em.EnergyStructure, "advance", scaled)
     found = island(0, kind)

@@ -258,7 +258,8 @@ def check_isolated(structure: Structure, p: Parameters) -> None:
         )
         raise InputError(
             "`structure` must have isolated equilibria; got one whose states may be turned about "
-            f"an axis for nothing at {at}. Give it phase=True, which picks one state of each orbit."
+            f"an axis for nothing at {at}. Give a rod phase=True, which picks one state of each "
+            "orbit, and members of a frame unequal bending stiffnesses, or a load across the axis."
         )
 
 

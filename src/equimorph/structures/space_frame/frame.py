@@ -13,6 +13,7 @@ from equimorph.errors import InputError
 from equimorph.model import Descriptor, remember_call
 from equimorph.structures.contract import Readers, Symmetry, Written
 from equimorph.structures.discrete import STEPS, SURE
+from equimorph.structures.equations import Shift
 from equimorph.structures.frame.images import SpatialImage, find_images
 from equimorph.structures.frame.patterns import Actuators, Loads, Patterns
 from equimorph.structures.network import Joints
@@ -24,6 +25,7 @@ from equimorph.structures.space_frame.mechanics import SpatialFrameMechanics
 from equimorph.structures.space_frame.member import SpatialMemberSpec, SpatialSupportSpec
 from equimorph.structures.space_frame.model import SpatialFrameModel
 from equimorph.structures.space_frame.network import spatial_network
+from equimorph.structures.space_frame.orbits import springs_on_orbits, turn_for_nothing
 from equimorph.structures.unit_system import Units, unit_system
 
 
@@ -325,6 +327,18 @@ class SpatialFrame(DescribedSpatialFrame):
         if self.model.stressed:
             return grow_stress(self.model, p)
         return super().natural(p)
+
+    def linearised(
+        self, z: Lanes, p: Parameters, dp: Parameters, shift: Shift = None
+    ) -> tuple[np.ndarray, ...]:
+        """F, F_p·dp and the parts of F_z − shift·mass, on orbits with a weak spring."""
+        if shift is None:
+            shift = springs_on_orbits(self, z, p)
+        return super().linearised(z, p, dp, shift)
+
+    def have_orbits(self, p: Parameters) -> Flags:
+        """Whether states of a frame on a line may be turned about it for nothing."""
+        return turn_for_nothing(self, p)
 
     @cached_property
     def _symmetries(self) -> tuple[Symmetry, ...]:
