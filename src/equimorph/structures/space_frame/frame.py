@@ -25,7 +25,11 @@ from equimorph.structures.space_frame.mechanics import SpatialFrameMechanics
 from equimorph.structures.space_frame.member import SpatialMemberSpec, SpatialSupportSpec
 from equimorph.structures.space_frame.model import SpatialFrameModel
 from equimorph.structures.space_frame.network import spatial_network
-from equimorph.structures.space_frame.orbits import springs_on_orbits, turn_for_nothing
+from equimorph.structures.space_frame.orbits import (
+    rates_on_orbits,
+    springs_on_orbits,
+    turn_for_nothing,
+)
 from equimorph.structures.unit_system import Units, unit_system
 
 
@@ -339,6 +343,10 @@ class SpatialFrame(DescribedSpatialFrame):
     def have_orbits(self, p: Parameters) -> Flags:
         """Whether states of a frame on a line may be turned about it for nothing."""
         return turn_for_nothing(self, p)
+
+    def along_orbits(self, z: Lanes, p: Parameters) -> Lanes:
+        """Rates of quaternions at which states off the line turn about it for nothing, or 0."""
+        return rates_on_orbits(self, z, p)
 
     @cached_property
     def _symmetries(self) -> tuple[Symmetry, ...]:

@@ -63,12 +63,29 @@ def turn_for_nothing(frame: SpatialFrameMechanics, p: Parameters) -> Flags:
 
 def springs_on_orbits(frame: SpatialFrameMechanics, z: Lanes, p: Parameters) -> Shift:
     """Shifts of the spectrum that take the direction of orbits out of the inertia, or none."""
+    on = on_orbits(frame, z, p)
+    return np.where(on, -SPRING, 0.0) if on.any() else None
+
+
+def on_orbits(frame: SpatialFrameMechanics, z: Lanes, p: Parameters) -> Flags:
+    """Whether states may be turned about the line for nothing, and would move."""
     line = line_of(frame.model)
     if line is None:
-        return None
-    on = np.abs(turned(frame, z, TURN * line) - z).max(axis=1) > OFF
+        return np.zeros(len(z), bool)
+    on = np.asarray(np.abs(turned(frame, z, TURN * line) - z).max(axis=1) > OFF)
     on[on] = turn_for_nothing(frame, p[on])
-    return np.where(on, -SPRING, 0.0) if on.any() else None
+    return on
+
+
+def rates_on_orbits(frame: SpatialFrameMechanics, z: Lanes, p: Parameters) -> Lanes:
+    """Rates of quaternions by a turn about the line; 0 off orbits."""
+    rates, on = np.zeros_like(z), on_orbits(frame, z, p)
+    line = line_of(frame.model)
+    if line is not None:
+        around = np.zeros((len(z), len(frame.model.free), 4))
+        around[..., 1:] = np.cross(line, frame.quaternions(z)[..., 1:])
+        rates[on, : around[0].size] = around[on].reshape(on.sum(), around[0].size)
+    return rates
 
 
 def turned(frame: SpatialFrameMechanics, z: Lanes, vector: Float[np.ndarray, "3"]) -> Lanes:
