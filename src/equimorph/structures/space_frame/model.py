@@ -19,6 +19,9 @@ LENGTH_STIFFNESS = 4000.0
 """Stiffness of the lengths of quaternions in the metric, in units of bending: margins are known
 below it."""
 
+ON_LINE = 1e-9
+"""Distance of joints from a line, relative to its length, at which they lie on it."""
+
 
 class Acting(NamedTuple):
     """Forces in each piece by the scalars that act there.
@@ -51,6 +54,15 @@ class SpatialFrameModel(AnyFrameModel):
     """
 
     network: SpatialNetwork
+
+    @cached_property
+    def line(self) -> Float[np.ndarray, "3"] | None:
+        """Direction of the line on which all joints lie; None where they do not."""
+        away = self.network.places - self.network.places[0]
+        line = away[np.argmax((away**2).sum(axis=1))]
+        line = line / np.linalg.norm(line)
+        across = away - (away @ line)[:, None] * line
+        return line if np.abs(across).max() <= ON_LINE * np.abs(away).max() else None
 
     # --- numbering ------------------------------------------------------------------------------
 

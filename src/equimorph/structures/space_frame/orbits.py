@@ -14,7 +14,6 @@ import numpy as np
 from equimorph.arrays import Flags, Float, Lanes, Parameters, Scalars
 from equimorph.structures.equations import Shift
 from equimorph.structures.space_frame.mechanics import SpatialFrameMechanics
-from equimorph.structures.space_frame.model import SpatialFrameModel
 from equimorph.structures.spatial.quaternions import exponential, product
 
 SAME = 1e-9
@@ -28,21 +27,12 @@ TURN = 1.0
 """Angle of the turn, in radians: a turn by this angle is not among finitely many symmetries."""
 
 
-def line_of(model: SpatialFrameModel) -> Float[np.ndarray, "3"] | None:
-    """Direction of the line on which all joints lie; None where they do not."""
-    away = model.network.places - model.network.places[0]
-    line = away[np.argmax((away**2).sum(axis=1))]
-    line = line / np.linalg.norm(line)
-    across = away - (away @ line)[:, None] * line
-    return line if np.abs(across).max() <= SAME * np.abs(away).max() else None
-
-
 def turn_for_nothing(frame: SpatialFrameMechanics, p: Parameters) -> Flags:
     """Whether a turn of any state about the line of a frame changes nothing, at parameters.
 
     By some random states at each of these: energies without multipliers stay as they are.
     """
-    line = line_of(frame.model)
+    line = frame.model.line
     if line is None:
         return np.zeros(len(p), bool)
     count = 2 * frame.constraints + 3
@@ -69,7 +59,7 @@ def springs_on_orbits(frame: SpatialFrameMechanics, z: Lanes, p: Parameters) -> 
 
 def on_orbits(frame: SpatialFrameMechanics, z: Lanes, p: Parameters) -> Flags:
     """Whether states may be turned about the line for nothing, and would move."""
-    line = line_of(frame.model)
+    line = frame.model.line
     if line is None:
         return np.zeros(len(z), bool)
     on = np.asarray(np.abs(turned(frame, z, TURN * line) - z).max(axis=1) > OFF)
@@ -80,7 +70,7 @@ def on_orbits(frame: SpatialFrameMechanics, z: Lanes, p: Parameters) -> Flags:
 def rates_on_orbits(frame: SpatialFrameMechanics, z: Lanes, p: Parameters) -> Lanes:
     """Rates of quaternions by a turn about the line; 0 off orbits."""
     rates, on = np.zeros_like(z), on_orbits(frame, z, p)
-    line = line_of(frame.model)
+    line = frame.model.line
     if line is not None:
         around = np.zeros((len(z), len(frame.model.free), 4))
         around[..., 1:] = np.cross(line, frame.quaternions(z)[..., 1:])
