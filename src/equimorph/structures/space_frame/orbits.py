@@ -7,6 +7,7 @@ these, and the sign of the eigenvalue that belongs to them is one of round-off. 
 spring `SPRING` is added to F_z: index and determinant are those across the orbit. Round-off over
 the spring may move a path along its orbit, on which all states are alike; margins are 0. Searches
 and sets refuse such parameters.
+See docs/decisions.md, "Orbits of frames get a weak spring".
 """
 
 import numpy as np
@@ -43,7 +44,7 @@ def turn_for_nothing(frame: SpatialFrameMechanics, p: Parameters) -> Flags:
     pair = z, turned(frame, z, TURN * line)
     energies = np.stack([frame.energy(each, many) for each in pair]).reshape(2, len(p), count)
     change, size = np.abs(energies[1] - energies[0]).max(axis=1), np.abs(energies).max(axis=(0, 2))
-    same = change <= SAME * size
+    same = np.asarray(change <= SAME * size)
     for lane in np.flatnonzero(same) if frame.constraints else []:
         some = slice(lane * count, (lane + 1) * count)
         states = pair[0][some], pair[1][some]
