@@ -232,7 +232,7 @@ def test_states_over_one_point_are_asked_for_once(spring_set, monkeypatch):
 
 def test_only_the_nearest_rims_of_a_point_are_crossed(spring_set, monkeypatch):
     """Of all rims near a point as many as are allowed, at the least distances."""
-    sheets = spring_set._sheets
+    sheets = spring_set.sheets
     near = sheets.above.near(spring_set.coordinates[spring_set.folds[0].ravel()[:40]])
     asked = near, sheets._brims, np.ones(len(near.cell), bool), sheets.above
     hit, corner = nearest_rims(*asked)

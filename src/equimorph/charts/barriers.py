@@ -118,7 +118,9 @@ def barriers_of(cells: Cells, preference: Preference) -> tuple[Barrier, ...]:
     return _each_once(found, cells)
 
 
-def _pieces_between_folds(facets: Facets, folded: VertexFlags, kind: str) -> list[Facets]:
+def _pieces_between_folds(
+    facets: Facets, folded: VertexFlags, kind: str
+) -> list[Int[np.ndarray, "..."]]:
     """Pieces of a barrier; ties over two parameters end on folds: both sides meet at a cusp.
 
     `facets`: by numbers of vertices. `folded`: which of these lie on folds.
