@@ -152,6 +152,15 @@ def test_fold_of_the_symmetric_sheet_passes_its_pitchforks(k, grid):
     np.testing.assert_allclose(eset.coordinates[hub], [[0.0, 0.0]], atol=1e-3)
 
 
+def assert_hilltop_at_0(eset):
+    """Nothing is bisected, and the fold meets the crossing at 0."""
+    assert_faithful(eset)
+    assert_crossings(eset)
+    assert eset.audit.bisected == 0
+    hub = np.intersect1d(eset.folds[0], eset.crossings[0])
+    np.testing.assert_allclose(eset.coordinates[hub], [[0.0, 0.0]], atol=1e-3)
+
+
 @pytest.mark.parametrize("grid", [(3, 3), (4, 5)])
 @pytest.mark.parametrize(("k", "bend"), [(0.4, 1.5), (2.5, 0.5), (2.5, 1.5)])
 def test_hilltops_are_found_on_crossings_that_bend(k, bend, grid):
@@ -161,11 +170,7 @@ def test_hilltops_are_found_on_crossings_that_bend(k, bend, grid):
     triangles were bisected here, and two sets of frames of the soak had no end of it.
     """
     eset = lifted(hilltop(k, bend), BOX, intervals=grid)
-    assert_faithful(eset)
-    assert_crossings(eset)
-    assert eset.audit.bisected == 0
-    hub = np.intersect1d(eset.folds[0], eset.crossings[0])
-    np.testing.assert_allclose(eset.coordinates[hub], [[0.0, 0.0]], atol=1e-3)
+    assert_hilltop_at_0(eset)
 
 
 @pytest.mark.parametrize("grid", [(3, 3), (4, 5)])
@@ -177,11 +182,7 @@ def test_hilltops_are_found_where_another_eigenvalue_is_small_all_around(soft, g
     Newton's method left the crossing: 4 to 12 triangles were bisected here.
     """
     eset = lifted(hilltop(2.5, 1.5, soft), BOX, intervals=grid)
-    assert_faithful(eset)
-    assert_crossings(eset)
-    assert eset.audit.bisected == 0
-    hub = np.intersect1d(eset.folds[0], eset.crossings[0])
-    np.testing.assert_allclose(eset.coordinates[hub], [[0.0, 0.0]], atol=1e-3)
+    assert_hilltop_at_0(eset)
 
 
 @pytest.mark.parametrize("grid", [(2, 2), (3, 3)])

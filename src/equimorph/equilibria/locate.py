@@ -21,7 +21,6 @@ from equimorph.equilibria.settle import Guards, Settled, settle
 from equimorph.equilibria.steps import Bracket, Front, Line, Workspace, compiled_steps, new_scalars
 from equimorph.linalg.simd import LANES
 from equimorph.marching import event_kernels as roots, kernels, tick_kernels as ticks
-from equimorph.marching.kernels import cubic_shares
 from equimorph.model import Constraint
 from equimorph.structures import Advance
 from equimorph.structures.contract import CompiledSteps
@@ -68,7 +67,7 @@ def locate_goal(curve: Curve, bracket: Bracket, goal: float) -> Located:
         curve, bracket = curve.take(beyond), bracket.take(beyond)
         old, new, share = bracket.before, bracket.after, np.empty(len(beyond))
         ends = (old.t - goal, new.t - goal, old.tangent_t, new.tangent_t, bracket.step)
-        cubic_shares(*ends, share)
+        roots.cubic_shares(*ends, share)
         z[beyond], found[beyond] = polish(curve, hermite(bracket, share)[0], t[beyond])
         found[beyond] &= _inside(curve, bracket, z[beyond], t[beyond])
         # measured as where folds and constraints are: which of them comes first decides the end

@@ -218,3 +218,20 @@ def file_points(trial, numbers, counts, active, buffer, filled):
         names[2, filled] = counts[LEVEL, i]
         filled += 1
     return filled
+
+
+@njit(**SUMS)
+def cubic_shares(start, stop, old, new, length, out):
+    """Share of a step where the cubic with these end values and slopes vanishes, by bisection."""
+    for i in range(start.shape[0]):
+        low, high = 0.0, 1.0
+        for _ in range(50):
+            s = 0.5 * (low + high)
+            a, b = (1 - s) * (1 - s) * (1 + 2 * s), s * s * (3 - 2 * s)
+            c, d = s * (1 - s) * (1 - s) * length[i], -s * s * (1 - s) * length[i]
+            value = a * start[i] + b * stop[i] + c * old[i] + d * new[i]
+            if (value < 0.0) == (start[i] < 0.0):
+                low = s
+            else:
+                high = s
+        out[i] = 0.5 * (low + high)

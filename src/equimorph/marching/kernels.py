@@ -390,20 +390,3 @@ def close_gaps(places, numbers, counts, values, active):
             for k in range(values.shape[0]):
                 values[k, i] = values[k, active]
     return active
-
-
-@njit(**SUMS)
-def cubic_shares(start, stop, old, new, length, out):
-    """Share of a step where the cubic with these end values and slopes vanishes, by bisection."""
-    for i in range(start.shape[0]):
-        low, high = 0.0, 1.0
-        for _ in range(50):
-            s = 0.5 * (low + high)
-            a, b = (1 - s) * (1 - s) * (1 + 2 * s), s * s * (3 - 2 * s)
-            c, d = s * (1 - s) * (1 - s) * length[i], -s * s * (1 - s) * length[i]
-            value = a * start[i] + b * stop[i] + c * old[i] + d * new[i]
-            if (value < 0.0) == (start[i] < 0.0):
-                low = s
-            else:
-                high = s
-        out[i] = 0.5 * (low + high)

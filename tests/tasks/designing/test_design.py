@@ -35,7 +35,7 @@ def test_limit_load_of_a_truss_of_given_length_of_bars():
     assert rise == pytest.approx(0.4, abs=1e-6)
     assert found.value == pytest.approx(fold_load(rise, half), rel=1e-6)
     again = em.limit_load(found.structure.natural_state(), "F")
-    assert found.value == pytest.approx(again.value, rel=1e-13)  # alone, not in a batch
+    assert found.value == pytest.approx(again.value, rel=1e-13)  # to round-off
     assert [step.value for step in found.history] == sorted(s.value for s in found.history)
 
 
