@@ -57,6 +57,24 @@ def test_lanes_do_not_influence_each_other():
         assert alone.t[0] == pytest.approx(whole.t[i], rel=1e-13)
 
 
+@pytest.mark.parametrize("largest", [0.5, 0.1, 0.02])
+@pytest.mark.parametrize("x", [0.0, 0.3])
+def test_lifts_that_locate_no_branch_points_are_lost_at_them_and_arrive_as_before(largest, x):
+    """x³ = a x on x = 0 through the pitchfork at a = 0; the side branches lead away from it."""
+    structure, a = pitchfork_form(1.0), x**2 if x else -1.0
+    line, z = lines(structure, [[x]], [[a, 0.0]], [[2.0, 0.0]])
+    located, refused = (
+        trace(line, z, options=TraceOptions(largest_step=largest, locate_jumps=each))
+        for each in (True, False)
+    )
+    ends = [EventCode.BRANCH_POINT, EventCode.LOST] if x == 0.0 else [EventCode.ARRIVED] * 2
+    assert [located.code[0], refused.code[0]] == ends
+    if x:
+        assert np.array_equal(located.z, refused.z)
+    else:
+        assert refused.t[0] * 3.0 - 1.0 == pytest.approx(0.0, abs=1e-6)
+
+
 def test_one_lost_lane_does_not_sink_the_batch():
     """The second lane starts at a fold, where nothing leads on."""
     curve, z = lines(fold_form(), [[1.0], [0.0]], [[1.0], [0.0]], [[4.0], [1.0]])
