@@ -70,7 +70,7 @@ class MinimaGraph:
 
     def add(self, z: Lanes, group: Groups) -> Numbers:
         """Numbers of states; those that are new are added, with their images under symmetries."""
-        before = len(self)
+        before, z = len(self), self.ground.pick(z, group)
         numbers = np.array(
             [self._number(*each) for each in zip(z, group.tolist(), strict=True)], int
         )
@@ -87,7 +87,8 @@ class MinimaGraph:
         """Images of a state; those on its orbit are joined with it as if by a saddle."""
         z, p = self.z[[number]], self.ground.p[[group]]
         for symmetry in self.ground.symmetries(group):
-            image = self._number(symmetry.apply(z, p)[0][0], group)
+            turned = self.ground.pick(symmetry.apply(z, p)[0], np.array([group]))
+            image = self._number(turned[0], group)
             self._images[number, symmetry.name] = image
             if symmetry.along_orbits and image != number:
                 self._orbits.append((number, image))

@@ -78,7 +78,13 @@ class Ground:
     def images(self, z: Lanes, group: int) -> list[Lanes]:
         """Images of states under these symmetries."""
         p = np.tile(self.p[group], (len(z), 1))
-        return [symmetry.apply(z, p)[0] for symmetry in self.symmetries(group)]
+        same = np.full(len(z), group)
+        return [self.pick(each.apply(z, p)[0], same) for each in self.symmetries(group)]
+
+    def pick(self, z: Lanes, group: Groups) -> Lanes:
+        """One state of each orbit on which there are some."""
+        p = self.p[group]
+        return self.structure.pick_on_orbits(z, p, p)
 
 
 class Pools:
@@ -272,7 +278,7 @@ class Pools:
         self.failures.append((UNRESOLVED, group[~good & ~beyond]))
         self.unresolved.append((z[~good & ~beyond], group[~good & ~beyond]))
         self.failures.append((BEYOND, group[beyond]))
-        z, group = z[good], group[good]
+        z, group = self.ground.pick(z[good], group[good]), group[good]
         # a little outside, states still serve as stepping stones
         z, group = (part[self.ground.excess(z, group) < 1.0] for part in (z, group))
         for each in np.unique(group):

@@ -258,7 +258,8 @@ def search_with_graph(
     The graph has also states beyond the constraints, as far as descents, at a pace, and lines met
     them.
     """
-    check_isolated(structure, points)
+    if not structure.finds_orbits:
+        check_isolated(structure, points)
     generator, guesses = np.random.default_rng(seed), -(-starts // runs)
     catches = [_Catch.empty(structure, point, tuple(within)) for point in points]
     todo = np.arange(len(points))

@@ -22,7 +22,7 @@ def dense_matrices(
     """F_z, from solves with it and a shift."""
     lanes, size = len(z), equations.size
     units = np.repeat(np.eye(size)[None], lanes, axis=0)
-    inverse = equations.solve(z, p, units, None, np.full(lanes, SHIFT)).x
+    inverse = equations.solve_whole(z, p, units, np.full(lanes, SHIFT))
     out = np.linalg.inv(inverse.transpose(0, 2, 1))
     at = np.arange(equations.unknowns)
     out[:, at, at] += SHIFT * equations.mass

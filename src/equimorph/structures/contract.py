@@ -222,7 +222,8 @@ class Structure(Rebuilt, Inertial):
     def have_orbits(self, p: Parameters) -> Flags:
         """Whether a continuous symmetry moves equilibria at parameters; they are not isolated then.
 
-        Lifts keep to one phase (`pick_on_orbits`); searches and sets refuse such parameters.
+        Lifts keep to one phase (`pick_on_orbits`); sets refuse such parameters, and searches
+        unless `finds_orbits`.
         """
         return np.zeros(len(p), bool)
 
@@ -289,6 +290,8 @@ class Structure(Rebuilt, Inertial):
     """
     readers: ClassVar[Readers] = {}
     """How arguments in such a text are read, by their names there; as texts by default."""
+    finds_orbits: ClassVar[bool] = False
+    """Whether searches find the states on orbits that `pick_on_orbits` gives."""
     energy_unit: str = "energy"
     """Unit of the descriptor ``energy``."""
 

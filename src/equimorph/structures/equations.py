@@ -151,6 +151,12 @@ class Equations(ABC):
         does it for a dense matrix, `DiscreteStructure` for a sparse one.
         """
 
+    def solve_whole(
+        self, z: Lanes, p: Parameters, rhs: Sides, shift: Values
+    ) -> Float[np.ndarray, "lanes k size"]:
+        """Solve with F_z − shift·mass, which is regular, where `solve` may leave orbits out."""
+        return self.solve(z, p, rhs, None, shift).x
+
     def index(self, z: Lanes, p: Parameters) -> Int[np.ndarray, " lanes"]:
         """Negative eigenvalues of the constrained Hessian."""
         nothing = np.zeros((len(z), 0, self.size))

@@ -13,9 +13,9 @@ from equimorph.structures.frame.statics import SpaceFlows
 from equimorph.structures.frame.strength import Nodal, NodalStrains
 from equimorph.structures.material_points import SupportSpring
 from equimorph.structures.rod.extrema import largest_norms
-from equimorph.structures.space_frame.mechanics import SpatialFrameMechanics
 from equimorph.structures.space_frame.model import SpatialFrameModel
 from equimorph.structures.space_frame.network import SpatialNetwork, Turning
+from equimorph.structures.space_frame.orbits import OrbitFrameMechanics
 from equimorph.structures.spatial.quaternions import (
     RIGHT,
     exponential,
@@ -52,7 +52,7 @@ def _inward(made: SpatialNetwork, joint: int) -> Float[np.ndarray, "3"]:
 Vectors = Float[np.ndarray, "lanes elements order 3"]
 
 
-class SpatialFrameFields(SpatialFrameMechanics, AnyFrame):
+class SpatialFrameFields(OrbitFrameMechanics, AnyFrame):
     """A frame in space with the fields that descriptors and figures show, in units of its model."""
 
     model: SpatialFrameModel

@@ -11,9 +11,9 @@ from equimorph.argument_vocabulary import count
 from equimorph.arrays import Flags, Float, Lanes, Parameters, Values
 from equimorph.errors import InputError
 from equimorph.model import Descriptor, remember_call
+from equimorph.structures.any_network import is_symmetry
 from equimorph.structures.contract import Readers, Symmetry, Written
 from equimorph.structures.discrete import STEPS, SURE
-from equimorph.structures.equations import Shift
 from equimorph.structures.frame.images import SpatialImage, find_images
 from equimorph.structures.frame.patterns import Actuators, Loads, Patterns
 from equimorph.structures.network import Joints
@@ -25,11 +25,6 @@ from equimorph.structures.space_frame.mechanics import SpatialFrameMechanics
 from equimorph.structures.space_frame.member import SpatialMemberSpec, SpatialSupportSpec
 from equimorph.structures.space_frame.model import SpatialFrameModel
 from equimorph.structures.space_frame.network import spatial_network
-from equimorph.structures.space_frame.orbits import (
-    rates_on_orbits,
-    springs_on_orbits,
-    turn_for_nothing,
-)
 from equimorph.structures.unit_system import Units, unit_system
 
 
@@ -300,6 +295,7 @@ class SpatialFrame(DescribedSpatialFrame):
 
     kind: ClassVar[str] = "spatial frame"
     upward: ClassVar[str] = "z"
+    finds_orbits: ClassVar[bool] = True
 
     @check_arguments
     def __init__(
@@ -332,25 +328,24 @@ class SpatialFrame(DescribedSpatialFrame):
             return grow_stress(self.model, p)
         return super().natural(p)
 
-    def linearised(
-        self, z: Lanes, p: Parameters, dp: Parameters, shift: Shift = None
-    ) -> tuple[np.ndarray, ...]:
-        """F, F_p·dp and the parts of F_z − shift·mass, on orbits with a weak spring."""
-        if shift is None:
-            shift = springs_on_orbits(self, z, p)
-        return super().linearised(z, p, dp, shift)
-
-    def have_orbits(self, p: Parameters) -> Flags:
-        """Whether states of a frame on a line may be turned about it for nothing."""
-        return turn_for_nothing(self, p)
-
-    def along_orbits(self, z: Lanes, p: Parameters) -> Lanes:
-        """Rates of quaternions at which states off the line turn about it for nothing, or 0."""
-        return rates_on_orbits(self, z, p)
-
     @cached_property
     def _symmetries(self) -> tuple[Symmetry, ...]:
-        return find_images(self, SpatialImage)
+        return (*self._half_turn, *find_images(self, SpatialImage))
+
+    @cached_property
+    def _half_turn(self) -> tuple[Symmetry, ...]:
+        """The half turn about the line, if it is a symmetry: it reverses what acts across."""
+        if not self.line_turns.possible:
+            return ()
+        across = self.line_turns.breaking[:, :-1].any(axis=0)
+        across |= (self.model.patterns.turns @ self.line_turns.cross.T).any(axis=(1, 2))
+        signs = np.where(across, -1.0, 1.0)
+
+        def apply(z: Lanes, p: Parameters) -> tuple[Lanes, Parameters]:
+            return self.turn(z, p, np.full(len(z), np.pi)), signs * p
+
+        found = Symmetry("half turn about the line", apply, signs, along_orbits=True)
+        return (found,) if is_symmetry(self, apply) else ()
 
     # --- pictures -------------------------------------------------------------------------------
 
