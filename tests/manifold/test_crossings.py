@@ -27,6 +27,7 @@ from oracles.surfaces import (
     crossing_sheets,
     hilltop,
     pitchforks,
+    returning,
     three_planes,
     transcriticals,
     tricritical,
@@ -481,6 +482,42 @@ def test_side_branches_that_leave_the_constraint_within_a_cell_are_strips(slant,
     plane = 2.1 * 2.2
     strip = 2.0 * np.linalg.norm(np.cross([cap, cap**2, 0.0], [0.0, -2.2 * slant, 2.2]))
     assert cell_sizes(eset).sum() == pytest.approx(plane + strip, abs=strip * cap**2)
+
+
+@pytest.mark.parametrize(
+    ("turn", "share", "slant", "bend"),
+    [
+        pytest.param(0.1, 1.2, -0.3, 0.0, id="before the crossing"),
+        pytest.param(0.1, 2.3, -0.3, 0.2, id="beyond the crossing"),
+        pytest.param(0.03, 1.5, 0.13, 0.0, id="narrower"),
+        pytest.param(0.03, 1.5, -0.3, 0.2, id="narrower and bent", marks=pytest.mark.slow),
+    ],
+)
+def test_side_branches_that_turn_back_before_they_leave_the_constraint_are_strips(
+    turn, share, slant, bend
+):
+    """x (x⁴ − 2 turn x² − a − slant·b − bend·b²), x² ≤ share·turn: folds at x² = turn.
+
+    The strip from the folds to the crossing is turn² wide, in intervals of 0.4. Set 724 of the soak
+    had 132 undecided triangles along such a strip.
+    """
+    structure = returning(turn, slant, bend)
+    square = Descriptor("square", "1", lambda z, p: z[:, 0] ** 2)
+    eset = lifted(structure, BOX, within=[square <= share * turn], intervals=(5, 4))
+    with unchecked():
+        assert_faithful(eset)
+        assert_crossings(eset)
+    assert sorted(stratum.index for stratum in eset.strata) == [0, 0, 0, 1, 1, 1]
+    assert (len(eset.crossings), len(eset.folds)) == (1, 2)
+    assert (eset.audit.components, eset.audit.euler_characteristic) == (1, 1)
+    b = np.linspace(-0.9, 1.1, 7)
+    for level in (-0.98, -0.2):
+        inner = turn * (1.0 + np.array([-1.0, 1.0]) * np.sqrt(1.0 + level))
+        roots = np.sqrt(inner[inner <= share * turn])
+        found = eset.over(a=level * turn**2 - slant * b - bend * b**2, b=b)
+        expected = np.tile(np.sort([0.0, *roots, *-roots]), (len(b), 1))
+        values = found.states.z[np.lexsort((found.states.z[:, 0], found.point)), 0]
+        np.testing.assert_allclose(values.reshape(len(b), -1), expected, atol=1e-9)
 
 
 @pytest.mark.parametrize("cap", [0.3, 1e-2, 1e-3, 1e-4, 1e-5])

@@ -73,6 +73,15 @@ def pitchforks(cubic: float, slant: float) -> Polynomial:
     return Polynomial(lambda x, a, b: integral(cubic * x**3 - (a + slant * b) * x), 1, ("a", "b"))
 
 
+def returning(turn: float, slant: float, bend: float) -> Polynomial:
+    """x (x⁴ − 2 turn x² − a − slant·b − bend·b²): side branches that fold back at x² = turn."""
+    return Polynomial(
+        lambda x, a, b: integral(x**5 - 2.0 * turn * x**3 - (a + slant * b + bend * b**2) * x),
+        1,
+        ("a", "b"),
+    )
+
+
 def transcriticals(skew: float, slant: float) -> Polynomial:
     """x (skew·x − a − slant·b): two planes that exchange their stability."""
     return Polynomial(lambda x, a, b: integral(skew * x**2 - (a + slant * b) * x), 1, ("a", "b"))

@@ -7,6 +7,7 @@ See docs/decisions.md, "Sheets that cross are lifted one by one".
 """
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -14,12 +15,12 @@ from equimorph.arrays import Float, Int, Items
 from equimorph.equilibria import ParameterLine, TraceOptions
 from equimorph.equilibria.critical import null_border
 from equimorph.equilibria.steps import Front, step_along
-from equimorph.equilibria.trace import Traces, trace
+from equimorph.equilibria.trace import trace
 from equimorph.equilibria.trace_options import EventCode
 from equimorph.manifold.complex.marked_complex import TRIANGLES
 from equimorph.manifold.geometry.crossings import reduction
 from equimorph.manifold.geometry.points import VertexKind
-from equimorph.manifold.lifting.edges import EFFORTS, NOISE
+from equimorph.manifold.lifting.edges import EFFORTS, NOISE, Inside, points_inside
 from equimorph.manifold.lifting.flood import flood
 from equimorph.manifold.lifting.pairing import Pairing
 from equimorph.manifold.lifting.seeds import Seeds, polish
@@ -34,8 +35,6 @@ TURNS = 2
 vertex at once, 33 after one turn, and none of six after more."""
 CURVES = 2
 """Through each crossing."""
-CROSSING_OF_ARC = 1
-"""Place of the crossing among the three points of an arc."""
 HALVES = 2
 """Of each curve through a crossing."""
 
@@ -68,7 +67,8 @@ def lonely(pairing: Pairing) -> Items:
             if point in through and pairing.alive(curve):
                 through[point] += 1
     for arc in (arc for edge, own in pairing.arcs.items() if used[edge] for arc in own):
-        through[arc[CROSSING_OF_ARC]] += 1
+        for point in through.keys() & set(arc):
+            through[point] += 1
     return np.array([point for point, count in through.items() if 0 < count != CURVES], int)
 
 
@@ -124,8 +124,8 @@ def _beyond(pairing: Pairing, alone: Int[np.ndarray, " crossings"]) -> Seeds:
     owner = halves // (CURVES * HALVES)
     towards = (front.tangent_t > 0.0).astype(int)
     z, p = front.z, line.take(owner).parameters(front.t)
-    edges = store.edge[alone[owner]]
-    for number in range(TURNS):
+    edges, met = store.edge[alone[owner]], []
+    for _ in range(TURNS):
         goal = mesh.edges[edges, towards]
         way = setting.parameters(mesh.vertices[goal]) - p
         options = TraceOptions(
@@ -133,14 +133,18 @@ def _beyond(pairing: Pairing, alone: Int[np.ndarray, " crossings"]) -> Seeds:
         )
         ways = ParameterLine(setting.structure, p, way)
         outcome = trace(ways, z, setting.constraints, options)
-        if number == 0:
-            _enter_arcs(pairing, alone, halves, ways, outcome)
+        leads_on = np.isin(outcome.code, (EventCode.RETURNED, EventCode.CONSTRAINT))
+        inside = points_inside(pairing, edges, outcome, ways, leads_on)
+        inside = _from_starts(z, ways, inside.take(leads_on[inside.lanes]))
+        met.append(replace(inside, lanes=halves[inside.lanes]))
         there = outcome.code == EventCode.ARRIVED
         reached.append(polish(setting, mesh, goal[there], outcome.z[there])[0])
         back = np.flatnonzero(outcome.code == EventCode.RETURNED)
         z, p, edges, towards = outcome.z[back], p[back], edges[back], 1 - towards[back]
+        halves = halves[back]
         if len(back) == 0:
             break
+    _enter_arcs(pairing, alone, Inside.concatenate(met))
     vertices, z, p, index = (np.concatenate(column) for column in zip(*reached, strict=True))
     return vertices, z, p, index
 
@@ -170,36 +174,36 @@ def _starts(
     return at, there.take(at)
 
 
-def _enter_arcs(
-    pairing: Pairing,
-    alone: Items,
-    halves: Int[np.ndarray, " m"],
-    line: ParameterLine,
-    outcome: Traces,
-) -> None:
+def _from_starts(z: Float[np.ndarray, "m size"], ways: ParameterLine, inside: Inside) -> Inside:
+    """Points inside edges in order along their lanes, with the regular ones before their folds."""
+    lanes = np.unique(inside.lanes[inside.kinds == VertexKind.FOLD])
+    p = ways.start[lanes]
+    index = ways.structure.index(z[lanes], p)
+    starts = Inside(lanes, z[lanes], p, index, np.full(len(lanes), VertexKind.BETWEEN))
+    all_points = Inside.concatenate([starts, inside])
+    return all_points.take(np.argsort(all_points.lanes, kind="stable"))
+
+
+def _enter_arcs(pairing: Pairing, alone: Items, met: Inside) -> None:
     """Enter curves both of whose halves leave through a constraint before they reach a vertex.
 
     So do the side branches of pitchforks near where these leave through the constraint, at every
-    scale. `halves` are the numbers of half-branches, and `outcome` tells how each of them ended.
+    scale; and those that turn back in folds before they leave, over strips along them. `met` are
+    points of half-branches in order, its lanes the numbers of these.
     """
     if pairing.mesh.dimension > TRIANGLES:
         return
-    setting, store = pairing.setting, pairing.points
-    left = outcome.code == EventCode.CONSTRAINT
-    left[outcome.passed.lanes] = False
-    p = line.parameters(outcome.t)
-    for curve in np.unique(halves[left] // HALVES).tolist():
-        lanes = np.flatnonzero(left & (halves // HALVES == curve))
-        if len(lanes) != HALVES:
-            continue
+    store = pairing.points
+    again = met.lanes[met.kinds == VertexKind.CROSSING]
+    left = np.setdiff1d(met.lanes[met.kinds == VertexKind.CAP], again)
+    for curve in np.unique(left[np.isin(left ^ 1, left)] // HALVES).tolist():
         crossing = int(alone[curve // CURVES])
         edge = int(store.edge[crossing])
-        index = setting.structure.index(outcome.z[lanes], p[lanes]).tolist()
-        ends = [
-            store.add(outcome.z[lane], p[lane], own, VertexKind.CAP, edge)
-            for lane, own in zip(lanes.tolist(), index, strict=True)
-        ]
-        pairing.arcs.setdefault(edge, []).append((ends[0], crossing, ends[1]))
+        first, second = (
+            store.add_many(own.z, own.p, own.index, own.kinds, edge).tolist()
+            for own in (met.take(met.lanes == HALVES * curve + k) for k in range(HALVES))
+        )
+        pairing.arcs.setdefault(edge, []).append((*first[::-1], crossing, *second))
     pairing.fit()
 
 

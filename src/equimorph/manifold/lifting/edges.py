@@ -169,7 +169,7 @@ def _follow(pairing: Pairing, rays: Rays, line: ParameterLine, options: TraceOpt
     mesh, setting = pairing.mesh, pairing.setting
     outcome = trace(line, pairing.points.z[rays.points], setting.constraints, options)
     good = np.isin(outcome.code, (EventCode.ARRIVED, EventCode.RETURNED, EventCode.CONSTRAINT))
-    inside = _inner(pairing, rays, outcome, line, good)
+    inside = points_inside(pairing, rays.edges, outcome, line, good)
     side = np.where(outcome.code == EventCode.RETURNED, rays.sides, 1 - rays.sides)
     vertices = mesh.edges[rays.edges, side]
     vertices[outcome.code == EventCode.CONSTRAINT] = -1
@@ -197,8 +197,8 @@ def _caps(pairing: Pairing, outcome: Traces, line: ParameterLine, good: Flags) -
     return Inside(lanes, z, p, index, np.full(len(lanes), VertexKind.CAP))
 
 
-def _inner(
-    pairing: Pairing, rays: Rays, outcome: Traces, line: ParameterLine, good: Flags
+def points_inside(
+    pairing: Pairing, edges: Items, outcome: Traces, line: ParameterLine, good: Flags
 ) -> Inside:
     """Folds and crossings of each lane, one regular point between neighbours, and where it left.
 
@@ -214,7 +214,7 @@ def _inner(
     keep = np.ones(len(at), bool)
     own = np.flatnonzero(kind == VertexKind.CROSSING)
     if len(own):
-        those = rays.take(passed.lanes[at[own]])
+        those = edges[passed.lanes[at[own]]]
         pinned = _pin(pairing, those, z[own], p[own], VertexKind.CROSSING)
         z[own], p[own] = pinned.z, pinned.p
         index[own] = lower_index(pairing.setting.structure, pinned.z, pinned.p)
@@ -222,7 +222,7 @@ def _inner(
         crossed = passed.lanes[at[own]]
         keep[own] = _first_ones(pairing, crossed, pinned)
         doubtful = np.flatnonzero((kind == VertexKind.FOLD) & np.isin(passed.lanes[at], crossed))
-        those = rays.take(passed.lanes[at[doubtful]])
+        those = edges[passed.lanes[at[doubtful]]]
         again = _pin(pairing, those, z[doubtful], p[doubtful], VertexKind.FOLD)
         keep[doubtful] = again.found
     events = Inside(passed.lanes[at], z, p, index, kind).take(keep)
@@ -271,7 +271,7 @@ def _first_ones(pairing: Pairing, lanes: Items, pinned: Pinned) -> ItemFlags:
 
 def _pin(
     pairing: Pairing,
-    rays: Rays,
+    edges: Items,
     z: Float[np.ndarray, "n size"],
     p: Float[np.ndarray, "n P"],
     kind: VertexKind,
@@ -282,7 +282,7 @@ def _pin(
     round-off for a while, which looks like folds.
     """
     setting, mesh = pairing.setting, pairing.mesh
-    ends = mesh.vertices[mesh.edges[rays.edges]] / setting.scales
+    ends = mesh.vertices[mesh.edges[edges]] / setting.scales
     span = ends[:, 1] - ends[:, 0]
     span /= np.linalg.norm(span, axis=1, keepdims=True)
     place, fold = embed(setting, z, p), kind == VertexKind.FOLD

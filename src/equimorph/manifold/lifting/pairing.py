@@ -184,7 +184,8 @@ class Pairing:
     crossings: dict[int, list[int]] = field(default_factory=dict)
     """Points of each edge at which two curves cross."""
     arcs: dict[int, list[tuple[int, ...]]] = field(default_factory=dict)
-    """Curves over each edge from a constraint through a crossing to a constraint: their points."""
+    """Curves over each edge that come from a constraint, pass a crossing, and on both sides of it
+    maybe folds, and leave through a constraint: their points."""
     hubs: dict[tuple[int, int], int] = field(default_factory=dict)
     """Points between two of these at which a fold of one of the sheets crosses, too."""
     tips: dict[tuple[int, int], int] = field(default_factory=dict)
