@@ -152,14 +152,17 @@ def multiply_lanes(x, matrix, out):
 @njit(**FLAGS)
 def largest_products(x, matrix, out):
     """Largest entries, by size, of rows of x times a matrix."""
+    totals = np.empty(matrix.shape[1])
     for lane in range(x.shape[0]):
+        totals[:] = 0.0
+        for i in range(matrix.shape[0]):
+            factor = x[lane, i]
+            for j in range(matrix.shape[1]):
+                totals[j] += factor * matrix[i, j]
         largest = 0.0
-        for j in range(matrix.shape[0]):
-            total = 0.0
-            for i in range(matrix.shape[1]):
-                total += x[lane, i] * matrix[j, i]
-            if not abs(total) <= largest:
-                largest = abs(total)
+        for j in range(matrix.shape[1]):
+            if not abs(totals[j]) <= largest:
+                largest = abs(totals[j])
         out[lane] = largest
 
 

@@ -38,7 +38,7 @@ class Advance:
 class CompiledNewton:
     """Newton's method at fixed parameters as one loop over the kernel of a structure's step.
 
-    Its results are those of `Equations.advance`.
+    Its steps are those of `Equations.correction`.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ class CompiledNewton:
     tables
         What it shares among lanes.
     guard
-        Least ratio of the pivots of a step; below it `Equations.advance` takes the step.
+        Least ratio of the pivots of a step; below it `Equations.correction` takes the step.
     widths
         Entries of z and p.
     """
@@ -188,6 +188,16 @@ class Equations(ABC):
         """One Newton step along the curve with parameter velocity `dp`; see `Advance`."""
         system = self.linear_system(z, p, dp[:, None])
         return advance_by(system, row, corner, defect, self.constraints)
+
+    def correction(self, z: Lanes, p: Parameters) -> Advance:
+        """One Newton step at fixed parameters, without a tangent.
+
+        It may be less exact than `advance`: the error of a correction is itself corrected.
+        """
+        lanes = len(z)
+        return self.advance(
+            z, p, np.zeros(p.shape), np.zeros(z.shape), np.ones(lanes), np.zeros(lanes)
+        )
 
 
 class JointEquations(Equations):

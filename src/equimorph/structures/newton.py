@@ -44,6 +44,9 @@ class Steps(Protocol):
     ) -> Advance:
         """One Newton step along the curve with parameter velocity `dp`; see `Advance`."""
 
+    def correction(self, z: Lanes, p: Parameters) -> Advance:
+        """One Newton step at fixed parameters."""
+
 
 @dataclass(frozen=True)
 class Limits:
@@ -188,9 +191,10 @@ def _loop_of(equations: Steps, work: tuple[np.ndarray, ...]) -> CompiledNewton |
 def _step(equations: Steps, work: tuple[np.ndarray, ...], m: int) -> tuple[np.ndarray, ...]:
     """One step of the first m lanes at work, as `correct_lanes` takes it."""
     z, p, dp, row, corner = (each[:m] for each in work[2:])
-    if dp.shape[1] == 0:  # at fixed parameters
-        dp, row = np.zeros(p.shape), np.zeros(z.shape)
-    step = equations.advance(z, p, dp, row, corner, np.zeros(m))
+    if dp.shape[1] == 0:
+        step = equations.correction(z, p)
+    else:
+        step = equations.advance(z, p, dp, row, corner, np.zeros(m))
     return step.dz, step.dt, step.index, step.tangent_z, step.tangent_t
 
 

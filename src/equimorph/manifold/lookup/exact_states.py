@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.distance import cdist
 
-from equimorph.arrays import Bool, Flags, Float, Int, Lanes, Numbers, Some
+from equimorph.arrays import Bool, Flags, Float, Int, Items, Lanes, Numbers, Some
 from equimorph.equilibria import ParameterLine, TraceOptions
 from equimorph.equilibria.trace import trace
 from equimorph.equilibria.trace_options import EventCode
@@ -80,6 +80,8 @@ NEAREST = 6
 the nearest ones. Hundreds of sheets of a chain or truss lie over one point."""
 
 Points = Float[np.ndarray, "points P"]
+Found = tuple[Float[np.ndarray, "n size"], Items, Items]
+"""States, the points that they lie over, and their cells."""
 
 
 def exact_states(
@@ -158,3 +160,16 @@ def first_of_same(structure: Structure, z: Lanes) -> Int[np.ndarray, " distinct"
     """States that no earlier one is the same as."""
     u = z[:, : structure.unknowns] * np.sqrt(structure.mass)
     return np.flatnonzero(~np.tril(cdist(u, u) <= SAME_STATE, -1).any(axis=1))
+
+
+def in_order(parts: list[Found]) -> Found:
+    """States of all parts, sorted by point and cell; each state is copied once."""
+    point, cell = (np.concatenate([part[k] for part in parts]) for k in (1, 2))
+    order = np.lexsort((cell, point))
+    place = np.empty_like(order)
+    place[order] = np.arange(len(order))
+    z, first = np.empty((len(order), parts[0][0].shape[1])), 0
+    for states, _, _ in parts:
+        z[place[first : first + len(states)]] = states
+        first += len(states)
+    return z, point[order], cell[order]

@@ -137,11 +137,13 @@ def guesses(hits, cells, folded, z, closest):
         for k in range(corners):
             share[0, k] /= total
         root_shares(share, at_fold, closest)
+        first = own[0]
         for j in range(size):
-            entry = share[0, 0] * z[own[0], j]
-            for k in range(1, corners):
-                entry += share[0, k] * z[own[k], j]
-            out[i, j] = entry
+            out[i, j] = share[0, 0] * z[first, j]
+        for k in range(1, corners):  # rows in turn fill vectors; sums keep their order
+            corner, weight = own[k], share[0, k]
+            for j in range(size):
+                out[i, j] += weight * z[corner, j]
     return out
 
 

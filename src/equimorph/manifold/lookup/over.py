@@ -28,9 +28,11 @@ from equimorph.manifold.geometry.topology import adjacency, senses
 from equimorph.manifold.lookup.cell_index import NUDGE, CellIndex, Hits
 from equimorph.manifold.lookup.exact_states import (
     CLOSEST,
+    Found,
     Points,
     exact_states,
     first_of_same,
+    in_order,
     lift_to,
     lifts_across_folds,
     nearest_pairs,
@@ -50,8 +52,6 @@ first rounds 13 brought states, of two second ones none."""
 CHUNK = 512
 """Points that are served together: their work arrays stay small."""
 
-Found = tuple[Float[np.ndarray, "n size"], Items, Items]
-"""States, the points that they lie over, and their cells."""
 Guesses = Float[np.ndarray, "hits size"]
 
 
@@ -139,13 +139,7 @@ class Sheets:
         doubtful = [near for _, near in chunks if near is not None]
         if doubtful:
             parts.extend(self._search(p, Hits.concatenate(doubtful)))
-        z, point, cell = (
-            column[0] if len(parts) == 1 else np.concatenate(column)
-            for column in zip(*parts, strict=True)
-        )
-        if doubtful:
-            order = np.lexsort((cell, point))
-            z, point, cell = z[order], point[order], cell[order]
+        z, point, cell = parts[0] if len(parts) == 1 else in_order(parts)
         if self.crossings is not None:
             z, point, cell = self._beside_crossings(self.crossings, p, z, point, cell)
         return States(self.structure, z, p[point]), point, cell
@@ -228,7 +222,10 @@ class Sheets:
         """Certain states over points, and the cells near undecided ones; `first` is added."""
         near = self._near(p[:, self.free])
         of_hits = near.cell, near.weights
-        hits = near.take(worth_trying(of_hits, near.inside, self._brims, self.above.maps, NUDGE))
+        tried = worth_trying(of_hits, near.inside, self._brims, self.above.maps, NUDGE)
+        if len(tried) == 0:
+            return (np.zeros((0, self.points.z.shape[1])), tried, tried), None
+        hits = near.take(tried)
         at = p[hits.point]
         guess = self._guess(hits)
         wanted, room = self.cell_index[hits.cell], self._room[hits.cell]

@@ -23,7 +23,7 @@ from equimorph.structures.equations import (
     Enclosed,
     LinearSystem,
     Shift,
-)
+)  # fmt: skip
 from equimorph.structures.resolution import Refinable
 from equimorph.structures.rod.centreline import Centreline, arcs_through, closest_approach
 from equimorph.structures.rod.discretisation import Mesh
@@ -200,6 +200,10 @@ class AnyRod(HeavyRod, Refinable):
         """One Newton step, with tangent and inertia."""
         return self.mechanics.advance(z, p, dp, row, corner, defect)
 
+    def correction(self, z: Lanes, p: Parameters) -> Advance:
+        """One Newton step at fixed parameters."""
+        return self.mechanics.correction(z, p)
+
     @property
     def compiled_newton(self) -> CompiledNewton | None:
         """Newton's method of the mechanics, if it is compiled."""
@@ -372,14 +376,11 @@ class AnyRod(HeavyRod, Refinable):
                 f"`apart` must be a share of the rod's length between 0 and 1; got {apart!r}."
             )
 
-        def found(z: Lanes, p: Parameters) -> tuple[Values, Values]:
-            return closest_approach(lambda s: self.places(z, p, s), apart)
-
         def value(z: Lanes, p: Parameters) -> Values:
-            return found(z, p)[0]
+            return closest_approach(lambda s: self.places(z, p, s), apart)[0]
 
         def place(z: Lanes, p: Parameters) -> Values:
-            return found(z, p)[1]
+            return closest_approach(lambda s: self.places(z, p, s), apart)[1]
 
         name, label = f"clearance({apart:.9g})", self.units.label("length")
         return Descriptor(name, label, value, "clearance", self.signature, place)
@@ -393,6 +394,5 @@ class AnyRod(HeavyRod, Refinable):
     def warn_of_contact(self, state: State, thickness: float) -> tuple[str, ...]:
         """One line where a rod of some thickness touches itself in a state."""
         distance = self.clearance()(state)
-        if distance > max(thickness, TOUCHING * self.units.value("length")):
-            return ()
-        return (f"the rod touches itself: points come as near as {distance:.3g}",)
+        free = distance > max(thickness, TOUCHING * self.units.value("length"))
+        return () if free else (f"the rod touches itself: points come as near as {distance:.3g}",)

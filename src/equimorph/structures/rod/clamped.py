@@ -13,7 +13,7 @@ from numpy.polynomial import legendre, polynomial
 
 from equimorph.arrays import Float, Lanes, Nodal, Parameters, Sides, Values, Velocity
 from equimorph.linalg import BorderedSolution, CondensedLayout, no_border
-from equimorph.linalg.condensed import PIVOT_GUARD
+from equimorph.linalg.condensed import PIVOT_GUARD, REFINABLE
 from equimorph.linalg.lanes import over_lanes
 from equimorph.structures.contract import CompiledSteps, Symmetry
 from equimorph.structures.equations import (
@@ -220,12 +220,17 @@ class ClampedMechanics(PlanarMechanics):
         given = (z, p, dp, row, corner, defect)
         return self.fused_advance(advance_lanes, self._step_data, *given)
 
+    def correction(self, z: Lanes, p: Parameters) -> Advance:
+        """The fused kernel, whose steps are exact enough down to smaller pivots."""
+        z, p = self.check_widths((z, p))
+        rest = np.zeros_like(p), np.zeros_like(z), np.ones(len(z)), np.zeros(len(z))
+        found = self.fused_step(advance_lanes, self._step_data, z, p, *rest)
+        return self.pivot_steps(*found, z, p, *rest, guard=REFINABLE)
+
     @cached_property
     def compiled_newton(self) -> CompiledNewton:
         """The loop over the fused step."""
-        return CompiledNewton(
-            newton_lanes, (self._step_data,), PIVOT_GUARD, (self.size, PARAMETERS)
-        )
+        return CompiledNewton(newton_lanes, (self._step_data,), REFINABLE, (self.size, PARAMETERS))
 
     def compiled_steps(self, bounds: Bounds) -> CompiledSteps:
         """Loops over the fused step and the search for the largest curvature."""

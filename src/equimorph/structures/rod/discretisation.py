@@ -111,6 +111,11 @@ class Mesh:
         return rows.reshape(2 * self.elements, -1)
 
     @cached_property
+    def highest_by_node(self) -> Float[np.ndarray, "nodes coefficients"]:
+        """`highest`, a row for each node, as its kernel takes it."""
+        return np.ascontiguousarray(self.highest.T)
+
+    @cached_property
     def element_weights(self) -> Float[np.ndarray, "elements order"]:
         """Quadrature weights of each element."""
         return np.asarray(self.lengths[:, None] * self.reference.weights)

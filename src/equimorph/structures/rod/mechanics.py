@@ -130,10 +130,12 @@ class RodMechanics(Equations):
         determinant[:, 0] *= self.determinant_sign
         return Advance(*outputs[:-1]), ratio
 
-    def pivot_steps(self, out: Advance, ratio: Values, *given: np.ndarray) -> Advance:
+    def pivot_steps(
+        self, out: Advance, ratio: Values, *given: np.ndarray, guard: float = PIVOT_GUARD
+    ) -> Advance:
         """Steps, those with an unsafe pivot by the general solve."""
-        if not ratio.min(initial=1.0) >= PIVOT_GUARD:
-            unsafe = ~(ratio >= PIVOT_GUARD)
+        if not ratio.min(initial=1.0) >= guard:
+            unsafe = ~(ratio >= guard)
             again = super().advance(*(x[unsafe] for x in given))
             for name, column in vars(again).items():
                 getattr(out, name)[unsafe] = column
@@ -215,7 +217,9 @@ class PlanarMechanics(RodMechanics):
     def tail(self, z: Lanes, p: Parameters) -> Values:
         """Largest of the two highest Legendre coefficients of θ in all elements."""
         out = np.empty(len(z))
-        largest_products(np.ascontiguousarray(self.nodal_angles(z, p)), self.mesh.highest, out)
+        largest_products(
+            np.ascontiguousarray(self.nodal_angles(z, p)), self.mesh.highest_by_node, out
+        )
         return out
 
 
