@@ -186,21 +186,27 @@ class Pools:
             returned = outcome.code == EventCode.RETURNED
             self._polish(outcome.z[returned], group[returned])
 
-    def start_between(self, count: int) -> None:
-        """Newton homotopies from random means of known states, `count` over each point.
+    def start_between(self, count: int, begin: int = 0) -> None:
+        """Newton homotopies from random means of known states, at most `count` over each point.
 
         Guesses of the structure may lie far apart where it has many unknowns; its states are
-        where others are.
+        where others are. Left out are points over which no state is new from `begin` on, and means
+        that the discretisation does not resolve: curves from these arrive nowhere.
         """
-        states = np.bincount(self.group, minlength=len(self.ground.p))
-        group = np.repeat(np.flatnonzero(states > 1), count)
+        groups = len(self.ground.p)
+        states, new = (
+            np.bincount(each, minlength=groups) for each in (self.group, self.group[begin:])
+        )
+        group = np.repeat(np.flatnonzero((states > 1) & (new > 0)), count)
         if len(group) == 0:
             return
         order, first = np.argsort(self.group, kind="stable"), np.cumsum(states) - states
         number = self.generator.integers(states[group][:, None], size=(len(group), MEANS))
         weights = self.generator.dirichlet(np.ones(MEANS), len(group))
         chosen = self.z[order[first[group][:, None] + number]]
-        self._by_homotopy(np.einsum("nk,nki->ni", weights, chosen), group)
+        guess = self.ground.structure.as_guess(np.einsum("nk,nki->ni", weights, chosen))
+        good = self.ground.structure.resolved(guess, self.ground.p[group])
+        self._by_homotopy(guess[good], group[good])
 
     def _forces(self, pairs: Pairs) -> Lanes:
         """Random forces, as strong as pushes from states to guesses."""

@@ -293,7 +293,7 @@ def _complete_by_arguments(
         pools = Pools(ground, generator, graph.z, graph.group)
         pools.push(pushed)
         pools.push_softly(pushed)
-        pools.start_between(BETWEEN)
+        pools.start_between(BETWEEN, pushed)
         pushed = len(graph)
         if len(pools.z) == known and not lacking:
             break

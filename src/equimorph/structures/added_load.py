@@ -171,6 +171,10 @@ class Pushed(Structure):
         """Guesses of the structure to which random ones rarely lead."""
         return self._base.special_guesses(self._own(p))
 
+    def as_guess(self, mean: Lanes) -> Lanes:
+        """Guesses of the structure at means of states."""
+        return self._base.as_guess(mean)
+
     def resolved(self, z: Lanes, p: Parameters) -> Flags:
         """Whether the structure's discretisation represents states."""
         return self._base.resolved(z, self._own(p))

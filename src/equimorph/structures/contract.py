@@ -215,6 +215,10 @@ class Structure(Rebuilt, Inertial):
         """Guesses to which random ones rarely lead, several per lane; by default there are none."""
         return np.zeros((0, len(p), self.size))
 
+    def as_guess(self, mean: Lanes) -> Lanes:
+        """Guesses at means of states; by default the means themselves."""
+        return mean
+
     @abstractmethod
     def resolved(self, z: Lanes, p: Parameters) -> Flags:
         """Whether states lie within what the discretisation can represent."""

@@ -23,6 +23,7 @@ from equimorph.structures.spatial.quaternions import (
     conjugate,
     exponential,
     product,
+    with_unit_rotations,
 )
 
 NONE = -1
@@ -301,6 +302,10 @@ class SpatialFrameMechanics(SpatialFrameLagrangian, JointEquations):
         angles = size * generator.normal(size=(lanes, len(model.hinged)))
         forces = FORCES * size * generator.normal(size=(lanes, self.constraints))
         return np.concatenate([q, angles, forces], axis=1)
+
+    def as_guess(self, mean: Lanes) -> Lanes:
+        """Means of states with rotations: quaternions of length 1."""
+        return with_unit_rotations(mean, self._rows)
 
     def natural_guess(self, p: Parameters) -> Lanes:
         """The frame as drawn."""

@@ -10,10 +10,13 @@ from collections.abc import Callable
 
 import numpy as np
 
-from equimorph.arrays import Flags, Float, Int
+from equimorph.arrays import Flags, Float, Int, Lanes
 
 Quaternions = Float[np.ndarray, "... 4"]
 Jet = Float[np.ndarray, "parts ..."]
+
+LEAST = 1e-12
+"""Length of a quaternion that has no direction."""
 
 PAIRS: dict[int, tuple[tuple[tuple[int, int], ...], ...]] = {
     1: (((0, 0),),),
@@ -165,6 +168,15 @@ def gather(
     out = np.zeros((count, *values.shape[:-2], values.shape[-1]), values.dtype)
     np.add.at(out, at, np.moveaxis(values, -2, 0))
     return np.moveaxis(out, 0, -2)
+
+
+def with_unit_rotations(z: Lanes, rows: int) -> Lanes:
+    """Unknowns whose first `rows` are quaternions, these with length 1."""
+    out = z.copy()
+    q = out[:, :rows].reshape(len(z), -1, 4)
+    size = np.linalg.norm(q, axis=-1, keepdims=True)
+    out[:, :rows] = (q / np.maximum(size, LEAST)).reshape(len(z), rows)
+    return out
 
 
 def normalise(q: Jet) -> tuple[Jet, Jet, Jet]:

@@ -31,6 +31,7 @@ from equimorph.structures.spatial.natural import (
     planar_guess,
 )
 from equimorph.structures.spatial.phase import OrbitMechanics, PinnedMechanics
+from equimorph.structures.spatial.quaternions import with_unit_rotations
 from equimorph.structures.states import State
 from equimorph.structures.unit_system import Quantity, Units
 
@@ -305,6 +306,10 @@ class SpatialRod(DescribedInSpace):
     def special_guesses(self, p: Parameters) -> Float[np.ndarray, "guesses lanes size"]:
         """Rods that turn evenly from one clamp to the other, with whole turns more or less."""
         return self.mechanics.with_whole_turns(p)
+
+    def as_guess(self, mean: Lanes) -> Lanes:
+        """Means of states with rotations: quaternions of length 1."""
+        return with_unit_rotations(mean, self.unknowns)
 
     def along_orbits(self, z: Lanes, p: Parameters) -> Lanes:
         """Rates at which states off the x axis turn about it, where they may for nothing."""
