@@ -51,9 +51,17 @@ class Motion(Columns):
         return np.where(self._begun, -2.0 * now + 0.5 * before, -now)
 
     def step(
-        self, structure: Structure, p: Parameters, h: float, rate: float
+        self,
+        structure: Structure,
+        p: Parameters,
+        h: float,
+        rate: float,
+        drive: tuple[Parameters, Parameters] | None = None,
     ) -> tuple["Motion", Flags]:
-        """Motions one step later, and which of them Newton's method found."""
+        """Motions one step later, and which of them Newton's method found.
+
+        drive: rates and accelerations of the parameters; None: they rest.
+        """
         n, ahead = structure.unknowns, self.z.copy()
         u = self.z[:, :n].copy()
         first = np.where(self._begun, 1.5, 1.0)
@@ -62,6 +70,8 @@ class Motion(Columns):
         faster = np.where(self._begun, 2.0 * self.velocity - self.velocity_before, self.velocity)
         mass = structure.inertia(ahead, p)
         gamma = structure.inertial_force(ahead, p, faster)
+        if drive is not None:
+            gamma = gamma + structure.driven_force(ahead, p, faster, *drive)
         rest = self._before(u, self.before)
         rest_v = self._before(self.velocity, self.velocity_before)
         heavy = mass * ((first / h) * (first / h + rate))[:, :, None]
@@ -119,6 +129,8 @@ class OwnPlant(DirectPlant):
         self.structure, self._step, self._rate = structure, step, rate
         self.p = start.p.copy()
         self._motion = Motion.of(start.z[None], np.zeros((1, structure.unknowns)))
+        nothing = np.full_like(start.p, np.nan)
+        self._rows, self._rates = (start.p, nothing), (np.zeros_like(start.p), nothing)
 
     def set(self, p: Row) -> None:
         """Set the parameters."""
@@ -132,11 +144,20 @@ class OwnPlant(DirectPlant):
         ArithmeticError
             If Newton's method does not converge.
         """
+        rate = self._difference(self.p, self._rows)
+        drive = rate[None], self._difference(rate, self._rates)[None]
         self._motion, found = self._motion.step(
-            self.structure, self.p[None], self._step, self._rate
+            self.structure, self.p[None], self._step, self._rate, drive
         )
+        self._rows, self._rates = (self.p, self._rows[0]), (rate, self._rates[0])
         if not found[0]:
             raise ArithmeticError("Newton's method lost a step in time; choose a shorter step")
+
+    def _difference(self, now: Row, before: tuple[Row, Row]) -> Row:
+        """Rate by values now, one step ago and two steps ago, as in `Motion`."""
+        first = now - before[0]
+        second = 1.5 * now - 2.0 * before[0] + 0.5 * before[1]
+        return np.where(np.isfinite(before[1]), second, first) / self._step
 
     @property
     def z(self) -> Float[np.ndarray, " size"]:

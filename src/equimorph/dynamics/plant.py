@@ -129,12 +129,32 @@ class LinkagePlant(Simulation):
         self._floats = writer.floats
         self._loaded = bool(linkage.forces.any() or linkage.node_forces.any())
         self._loaded |= bool(linkage.couples.any() or linkage.pressure.any())
+        self._standing = self._standing_places()
+        self._shifts = bool(self._standing[..., :-1].any())
+        self._rate = self._next_rate = np.zeros((len(self._hinge), 2))
         self._force, self._couple = np.zeros((len(self._hinge), 2)), np.zeros(len(self._hinge))
         self._total = np.zeros(len(self._floats))
         self._pushed = np.array([at for at, _, _ in self._floats], dtype=int)
         self._drives = self._find_drives(writer)
         self._changing: dict[bytes, list[_Drive]] = {}
         self._qpos, self._applied = self.data.qpos, self.data.qfrc_applied
+
+    def _standing_places(self) -> Float[np.ndarray, "bodies 2 settings"]:
+        """Where the support holds on which each body, and all that carries it, stands, or 0."""
+        tree, linkage = self.tree, self.linkage
+        held = np.isinf(linkage.supports.stiffness)[..., None] * linkage.supports.places
+        places = np.einsum("nas,nax->nxs", held, linkage.supports.axes)
+        out = np.zeros((len(tree.bodies), *places.shape[1:]))
+        for k, body in enumerate(tree.bodies):
+            if body.base >= 0:
+                out[tree.above[:, k] > 0.0] = places[body.base]
+        return out
+
+    @cached_property
+    def _masses(self) -> Float[np.ndarray, " bodies"]:
+        """Masses of the bodies."""
+        flat, node = self.linkage.masses.ravel(), self.linkage.node_mass
+        return np.array([flat[b.link] if b.link >= 0 else node for b in self.tree.bodies])
 
     def _find_drives(self, writer: Writer) -> list[_Drive]:
         """All that the settings change: rests of springs, places of supports, loads."""
@@ -175,7 +195,8 @@ class LinkagePlant(Simulation):
         data, bodies = self.data, self.tree.bodies
         self._mujoco.mj_resetData(self.model, data)
         self.set(y)
-        self._dragged = None
+        self._dragged, self._rate = None, np.zeros_like(self._rate)
+        self._next_rate = self._rate
         angles = self.tree.angles(v)
         for k, body in enumerate(bodies):
             if self._hinge[k] >= 0:
@@ -195,6 +216,8 @@ class LinkagePlant(Simulation):
         drives = self._drives
         if self._y is not None:
             self._dragged = self._drag @ (y - self._y) / self._step
+            if self._shifts:
+                self._next_rate = self._standing @ (y - self._y) / self._step
             moves = y != self._y
             key = moves.tobytes()
             if key not in self._changing:
@@ -206,11 +229,16 @@ class LinkagePlant(Simulation):
         self._y = y.copy()
 
     def step(self) -> None:
-        """One step in time; supports that moved since the last one carry their dampers."""
+        """One step in time; supports that moved since the last one carry their dampers.
+
+        They accelerate what stands on them, whose coordinates are relative to them: forces of
+        inertia act, impulses where the rate jumps.
+        """
         self._applied[:] = 0.0 if self._dragged is None else self._dragged
         self._dragged = None
-        if self._loaded:
+        if self._loaded or self._shifts:
             self._apply()
+        self._rate, self._next_rate = self._next_rate, np.zeros_like(self._rate)
         self._mujoco.mj_step(self.model, self.data)
 
     def _apply(self) -> None:
@@ -220,8 +248,10 @@ class LinkagePlant(Simulation):
         c, s = np.cos(angles), np.sin(angles)
         force, total = self._force, self._total
         across = force
-        if self._side is not None:  # pressure: on every link a force in its middle
-            own = (sizes * (self._side @ self._y))[:, None] * np.stack([-s, c], axis=1)
+        if self._side is not None or self._shifts:  # on every link a force in its middle
+            own = (self._rate - self._next_rate) * (self._masses / self._step)[:, None]
+            if self._side is not None:
+                own += (sizes * (self._side @ self._y))[:, None] * np.stack([-s, c], axis=1)
             force = force + self.tree.levers.T @ own
             across = force - 0.5 * own
             carried = [self.tree.above[:, k] @ own[:, axis] for _, k, axis in self._floats]

@@ -210,8 +210,9 @@ def _float(
 
 
 def _matters(linkage: Linkage, node: int) -> bool:
-    """Whether anything but the end of one member is at a node without support."""
+    """Whether a node without support turns, or joins, loads or holds what ends there."""
+    turns = bool(linkage.free[linkage.turn_entries[node]])
     others = int((linkage.ends == node).sum()) > 1
     loaded = linkage.node_forces[node].any() or linkage.couples[linkage.turn_entries[node]].any()
     sprung = 0.0 < linkage.supports.turning[node] < np.inf
-    return bool(others or loaded or sprung)
+    return bool(turns or others or loaded or sprung)

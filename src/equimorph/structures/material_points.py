@@ -100,21 +100,50 @@ class MaterialPoints:
 
     def inertial_force(self, z: Lanes, p: Parameters, velocity: Velocity) -> Velocity:
         """``JᵀW D²x[u̇, u̇]``, with the second derivative of all places along the velocity."""
-        out = np.zeros_like(velocity)
-        for lane, rate in enumerate(velocity):
-            size = float(np.abs(rate).max())
-            if size == 0.0:
-                continue
+        out, rest = np.zeros_like(velocity), np.zeros_like(p)
+        for lane in np.flatnonzero(velocity.any(axis=1)):
             moved = self._moved(z[lane], p[lane])
-            way = STEP * np.concatenate([rate, moved.follow @ rate]) / size
-            at = z[lane] + np.array([-2.0, -1.0, 0.0, 1.0, 2.0])[:, None] * way
-            many = np.repeat(p[lane][None], 5, axis=0)
-            twice = np.array([-1.0, 16.0, -30.0, 16.0, -1.0]) / (12.0 * (STEP / size) ** 2)
-            bend = twice @ self.places(at, many).reshape(5, -1)
-            gaps = twice @ self.equations.residual(at, many)[:, self.equations.unknowns :]
-            bend -= moved.forced @ (moved.compliance @ gaps)
+            bend = self._along(z[lane], p[lane], moved, velocity[lane], rest[lane])[1]
             out[lane] = moved.columns.T @ (moved.weights * bend)
         return out
+
+    def driven_force(
+        self, z: Lanes, p: Parameters, velocity: Velocity, dp: Parameters, ddp: Parameters
+    ) -> Velocity:
+        """``JᵀW`` times the acceleration of all places that rates and accelerations of p add."""
+        out, rest = np.zeros_like(velocity), np.zeros_like(p)
+        for lane in np.flatnonzero(dp.any(axis=1) | ddp.any(axis=1)):
+            moved = self._moved(z[lane], p[lane])
+            here, rate = (z[lane], p[lane], moved), velocity[lane]
+            bend = self._along(*here, rate, dp[lane])[1] - self._along(*here, rate, rest[lane])[1]
+            bend += self._along(*here, 0.0 * rate, ddp[lane])[0]
+            out[lane] = moved.columns.T @ (moved.weights * bend)
+        return out
+
+    def _along(
+        self,
+        z: Float[np.ndarray, " size"],
+        p: Float[np.ndarray, " parameters"],
+        moved: _Moved,
+        rate: Float[np.ndarray, " unknowns"],
+        dp: Float[np.ndarray, " parameters"],
+    ) -> tuple[Float[np.ndarray, " places"], Float[np.ndarray, " places"]]:
+        """First and second derivatives of all places at rates of unknowns and parameters."""
+        equations, n = self.equations, self.equations.unknowns
+        size = max(np.abs(rate).max(), np.abs(dp / equations.scales).max(initial=0.0))
+        if size == 0.0:
+            nothing = np.zeros(len(moved.weights))
+            return nothing, nothing
+        gaps = equations.parameter_derivative(z[None], p[None], dp[None])[0, n:]
+        way = np.concatenate([rate, moved.follow @ rate - moved.compliance @ gaps])
+        step = STEP / size
+        shares = step * np.array([-2.0, -1.0, 0.0, 1.0, 2.0])[:, None]
+        at = z + shares * way, p + shares * dp
+        once = np.array([1.0, -8.0, 0.0, 8.0, -1.0]) / (12.0 * step)
+        twice = np.array([-1.0, 16.0, -30.0, 16.0, -1.0]) / (12.0 * step**2)
+        places = self.places(*at).reshape(5, -1)
+        gaps = twice @ equations.residual(*at)[:, n:]
+        return once @ places, twice @ places - moved.forced @ (moved.compliance @ gaps)
 
     def _moved(
         self,
@@ -193,6 +222,24 @@ class Inertial(Equations, ABC):
     def sprung(self) -> MaterialPoints | None:
         """Material points on springs whose places the unknowns leave free; None: there are none."""
         return None
+
+    @property
+    def material(self) -> MaterialPoints | None:
+        """Material points whose places may move with the parameters; None: masses do not."""
+        return None
+
+    def driven_force(
+        self, z: Lanes, p: Parameters, velocity: Velocity, dp: Parameters, ddp: Parameters
+    ) -> Velocity:
+        """Forces of inertia that rates and accelerations of the parameters add to ``M ü + Γ``.
+
+        Those of the material points; without these, ``(∂M/∂p·ṗ) u̇`` of an energy ½ u̇ᵀM(u, p)u̇.
+        """
+        if self.material is not None:
+            return self.material.driven_force(z, p, velocity, dp, ddp)
+        step = INERTIA_DIFFERENCE * dp
+        change = self.inertia(z, p + step) - self.inertia(z, p - step)
+        return np.asarray(np.einsum("lij,lj->li", change, velocity) / (2.0 * INERTIA_DIFFERENCE))
 
     @property
     def massless(self) -> str:

@@ -21,6 +21,7 @@ from equimorph.model import (
 )
 from equimorph.structures.contract import Structure, Symmetry
 from equimorph.structures.equations import AnyBorder, Direction, Enclosed, Shift
+from equimorph.structures.material_points import MaterialPoints
 from equimorph.structures.states import State, natural_state
 
 EFFORTS = {"natural length": "force", "k": "length", "force/length": "length²"}
@@ -79,6 +80,15 @@ class Spring(Structure):
         """m (x_l/cos²δ)²: the mass moves along y = x_l tan δ."""
         delta, x, _, _ = self._split(z, p)
         return np.asarray(self._mass * (x / np.cos(delta) ** 2) ** 2)[:, None, None]
+
+    @property
+    def material(self) -> MaterialPoints:
+        """B, at (0, x_l tan δ)."""
+
+        def places(z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes 1 1"]:
+            return np.asarray(p[:, :1] * np.tan(z))[:, None]
+
+        return MaterialPoints(self, places, np.array([self._mass]))
 
     def _split(self, z: Lanes, p: Parameters) -> tuple[Values, Values, Values, Values]:
         return z[:, 0], p[:, 0], p[:, 1], p[:, 2]

@@ -316,12 +316,12 @@ class AnyFrame(StressedFrame, Shortening, Refinable):
 
     def inertia(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes unknowns unknowns"]:
         """Mass matrix of the members, each as heavy everywhere."""
-        own = self._material
+        own = self.material
         return super().inertia(z, p) if own is None else own.inertia(z, p)
 
     def inertial_force(self, z: Lanes, p: Parameters, velocity: Velocity) -> Velocity:
         """Forces of inertia of the members at constant rates of the unknowns."""
-        own = self._material
+        own = self.material
         if own is None:
             return super().inertial_force(z, p, velocity)
         return own.inertial_force(z, p, velocity)
@@ -334,7 +334,7 @@ class AnyFrame(StressedFrame, Shortening, Refinable):
     @property
     def sprung(self) -> MaterialPoints | None:
         """Points of the members, where the unknowns leave springs at supports free."""
-        points = self._material
+        points = self.material
         if points is None:
             return None
         starts = np.repeat(self.network.ends[:, 0], len(self.model.mesh.weights))
@@ -343,7 +343,7 @@ class AnyFrame(StressedFrame, Shortening, Refinable):
         return None if springs.follow else replace(points, springs=springs)
 
     @property
-    def _material(self) -> MaterialPoints | None:
+    def material(self) -> MaterialPoints | None:
         """Masses of the points of the members; None if a mass is not known."""
         model, space = self.model, self.network.space
         if model.masses is None:

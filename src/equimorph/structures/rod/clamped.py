@@ -36,7 +36,11 @@ from equimorph.structures.rod.clamped_field_kernels import fields_lanes, largest
 from equimorph.structures.rod.clamped_kernels import advance_lanes
 from equimorph.structures.rod.clamped_march_kernels import march_lanes, newton_lanes, search_lanes
 from equimorph.structures.rod.discretisation import Mesh, reference_element
-from equimorph.structures.rod.inertia import inextensible_force, inextensible_inertia
+from equimorph.structures.rod.inertia import (
+    inextensible_force,
+    inextensible_inertia,
+    inextensible_places,
+)
 from equimorph.structures.rod.mechanics import Bounds, PlanarMechanics
 from equimorph.structures.rod.planar_energy import PlanarEnergy
 from equimorph.structures.rod.profiles import LoadShape
@@ -173,6 +177,10 @@ class ClampedMechanics(PlanarMechanics):
         """∂L/∂(Θ, Δ, q, ν): actuator couples, ∫Qy, −λ."""
         first, last, lift = self._residual(z, p)[1].T
         return np.stack([first - last, first + last, lift, -z[:, -2]], axis=1)
+
+    def nodal_places(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes nodes 2"]:
+        """Places of all nodes by integrals from end A."""
+        return inextensible_places(self.mesh, self.nodal_angles(z, p))
 
     def inertia(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes unknowns unknowns"]:
         """JᵀWJ of the inner nodes' angles."""

@@ -101,15 +101,15 @@ class GeneralInertia(JointEquations, PlanarMechanics):
     def scalars(self, z: Lanes, p: Parameters) -> Scalars:
         """(Multipliers, parameters, 1)."""
 
+    def nodal_places(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes nodes 2"]:
+        """Places of all nodes by integrals from the end that holds them."""
+        return nodal_places(self.model, self.nodal_angles(z, p), self.scalars(z, p))
+
     @property
     def sprung(self) -> MaterialPoints | None:
         """Its nodes on springs at both ends, or at one where the other end is free."""
-
-        def places(z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes nodes 2"]:
-            return nodal_places(self.model, self.nodal_angles(z, p), self.scalars(z, p))
-
         springs = self.model.springs_along
-        points = MaterialPoints(self, places, self.mesh.weights, springs)
+        points = MaterialPoints(self, self.nodal_places, self.mesh.weights, springs)
         return None if springs.follow else points
 
     def inertia(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes unknowns unknowns"]:

@@ -12,6 +12,7 @@ from functools import lru_cache
 import numpy as np
 
 from equimorph.arrays import Float, Lanes, Nodal, Parameters, Velocity
+from equimorph.linalg.dense import multiply
 from equimorph.model import Parameter
 from equimorph.structures.collapse import Shortening
 from equimorph.structures.material_points import MaterialPoints
@@ -24,6 +25,12 @@ def _moments(mesh: Mesh) -> Float[np.ndarray, "nodes nodes"]:
     """IᵀWI of the matrix I that integrates nodal values from end A to each node."""
     integral = mesh.integration(mesh.nodes)
     return np.asarray(integral.T @ (mesh.weights[:, None] * integral))
+
+
+def inextensible_places(mesh: Mesh, theta: Nodal) -> Float[np.ndarray, "lanes nodes 2"]:
+    """Places of all nodes of an inextensible rod whose end A rests."""
+    integral = mesh.integration(mesh.nodes).T
+    return np.stack([multiply(each, integral) for each in (np.cos(theta), np.sin(theta))], axis=2)
 
 
 def inextensible_inertia(mesh: Mesh, theta: Nodal) -> Float[np.ndarray, "lanes nodes nodes"]:
@@ -59,6 +66,17 @@ class HeavyRod(Shortening):
     @abstractmethod
     def sprung_in_lengths(self) -> MaterialPoints | None:
         """Points of a rod of mass 1 on springs that the unknowns leave free; None without these."""
+
+    @property
+    @abstractmethod
+    def material_in_lengths(self) -> MaterialPoints:
+        """Points of a rod of mass 1."""
+
+    @property
+    def material(self) -> MaterialPoints | None:
+        """Its points, which supports may move; None without a mass."""
+        unit, points = self.units.time(), self.material_in_lengths
+        return None if unit is None else replace(points, masses=unit**2 * points.masses)
 
     @property
     def sprung(self) -> MaterialPoints | None:

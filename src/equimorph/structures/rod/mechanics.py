@@ -192,6 +192,10 @@ class PlanarMechanics(RodMechanics):
         """Angles θ at all nodes, the prescribed ends included."""
 
     @abstractmethod
+    def nodal_places(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes nodes 2"]:
+        """Places of all nodes, whose derivatives are those in `inertia`."""
+
+    @abstractmethod
     def fields(
         self, z: Lanes, p: Parameters, s: Float[np.ndarray, " points"]
     ) -> Float[np.ndarray, "lanes points 4"]:

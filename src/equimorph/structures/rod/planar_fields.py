@@ -103,6 +103,12 @@ class Measured(StressedRod):
         return Centreline(fields[:, :, 2:], tangents, left[:, :, None])
 
     @property
+    def material_in_lengths(self) -> MaterialPoints:
+        """Points of a rod of mass 1: the nodes of the elements."""
+        rod = self.mechanics
+        return MaterialPoints(rod, rod.nodal_places, rod.mesh.weights)
+
+    @property
     def sprung_in_lengths(self) -> MaterialPoints | None:
         """Points of a rod of mass 1 on springs that the unknowns leave free."""
         return self.mechanics.sprung

@@ -79,20 +79,22 @@ class DescribedInSpace(StressedRod):
         self, z: Lanes, p: Parameters
     ) -> Float[np.ndarray, "lanes unknowns unknowns"]:
         """Mass matrix of a rod of mass 1: masses at the nodes of the elements."""
-        return self._material.inertia(z, p)
+        return self.material_in_lengths.inertia(z, p)
 
     def inertial_force_in_lengths(self, z: Lanes, p: Parameters, velocity: Velocity) -> Velocity:
         """Γ of the same masses."""
-        return self._material.inertial_force(z, p, velocity)
+        return self.material_in_lengths.inertial_force(z, p, velocity)
 
     @property
     def sprung_in_lengths(self) -> MaterialPoints | None:
         """Points of a rod of mass 1 on springs that the unknowns leave free."""
         springs = self.mechanics.model.springs_along
-        return None if springs.follow else replace(self._material, springs=springs)
+        return None if springs.follow else replace(self.material_in_lengths, springs=springs)
 
     @property
-    def _material(self) -> MaterialPoints:
+    def material_in_lengths(self) -> MaterialPoints:
+        """Points of a rod of mass 1: the nodes of the elements."""
+
         def places(z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes points 3"]:
             return self.recovery.nodal(z, p).places.reshape(len(z), -1, 3)
 
