@@ -2,7 +2,7 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import IntEnum
 from functools import cached_property
 
@@ -26,6 +26,7 @@ from equimorph.charts.twins import add_twins
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet, Level, singular_set
 from equimorph.manifold.complex.equilibrium_set import check_cells
+from equimorph.manifold.complex.kept_tables import with_cells
 from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.geometry.topology import facets_of
 from equimorph.model import Descriptor
@@ -323,8 +324,8 @@ class DescriptorChart(Chart):
         if len(self.names) != 2:
             return plain
         fixed, sheet = facets_of(eset.folds, 2), sheet_labels(plain)
-        flipped = flip_inverted_triangles(eset.cells, plain.values, fixed, sheet)
-        return Cells(replace(eset, cells=flipped), self.coordinates, numbers)
+        flipped = flip_inverted_triangles(eset.cells, plain.values, fixed, sheet, plain.whole)
+        return Cells(with_cells(eset, flipped), self.coordinates, numbers)
 
     @cached_property
     def singular(self) -> Level:

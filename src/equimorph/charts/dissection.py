@@ -25,7 +25,14 @@ from equimorph.manifold.complex.vertices import Vertices, free_vertices
 from equimorph.manifold.geometry.exact_points import Corrected
 from equimorph.manifold.geometry.points import on_fold
 from equimorph.manifold.geometry.simplices import squared_sides
-from equimorph.manifold.geometry.topology import chains, count_corners, flags_of, keys_of, labels
+from equimorph.manifold.geometry.topology import (
+    adjacency,
+    chains,
+    count_corners,
+    flags_of,
+    keys_of,
+    labels,
+)
 from equimorph.manifold.lookup.exact_states import exact_states
 from equimorph.manifold.queries.levels import whole_set
 from equimorph.structures import States
@@ -174,7 +181,9 @@ class _Work:
         """The same with fewer triangles that chords of curved folds have turned over."""
         fabric = self.fabric
         places = fabric.vertices.p[:, fabric.setting.free]
-        corners = flip_inverted_triangles(fabric.cells, places, fabric.facets, fabric.cell_index)
+        corners = flip_inverted_triangles(
+            fabric.cells, places, fabric.facets, fabric.cell_index, adjacency(fabric.cells)
+        )
         squared = squared_sides(fabric.vertices.place, corners)
         return replace(self, fabric=replace(fabric, cells=corners, squared=squared))
 

@@ -1,13 +1,14 @@
 """Sets made ready for charts: cut along crossings, with vertices at cusps, without folded cells."""
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
 from equimorph.arrays import Bool, Facets, Float, Int, ItemFlags, Items, Pairs, Some, VertexNumbers
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.complex.excerpts import Excerpt, excerpt_of
-from equimorph.manifold.complex.kept_tables import from_cache, kept
+from equimorph.manifold.complex.kept_tables import adjacency_of, from_cache, kept
 from equimorph.manifold.complex.marked_complex import Fabric
 from equimorph.manifold.complex.vertices import Vertices
 from equimorph.manifold.geometry.points import VertexKind, on_fold
@@ -117,7 +118,8 @@ def _with_cusps(eset: EquilibriumSet) -> EquilibriumSet | None:
     # straight sides of cells at a cusp may pass it on its wrong side
     whole = whole_set(excerpt.put_back(fabric))
     fixed = facets_of((*whole.folds, *whole.crossings), 2)
-    cells = flip_inverted_triangles(whole.cells, whole.coordinates, fixed, whole.stratum)
+    links = adjacency_of(whole)
+    cells = flip_inverted_triangles(whole.cells, whole.coordinates, fixed, whole.stratum, links)
     return replace(whole, cells=cells)
 
 
@@ -126,6 +128,7 @@ def flip_inverted_triangles(
     places: Float[np.ndarray, "V 2"],
     fixed: Pairs,
     sheet: Int[np.ndarray, " C"],
+    whole: Adjacency,
 ) -> Int[np.ndarray, "C 3"]:
     """Flip edges so that fewer triangles overlap their neighbours in the plane.
 
@@ -142,22 +145,26 @@ def flip_inverted_triangles(
         Edges that stay, beside those between sheets.
     sheet
         Sheet of each triangle, within which it overlaps others.
+    whole
+        Which triangles share edges.
     """
-    whole, base = adjacency(corners), len(places)
-    a, b = whole.links.T
-    apart = np.isin(np.arange(len(whole.facets)), whole.across[sheet[a] != sheet[b]])
+    (a, b), base = whole.links.T, len(places)
+    apart = np.zeros(len(whole.facets), bool)
+    apart[whole.across[sheet[a] != sheet[b]]] = True
     signs = orientation(corners, _without(whole, apart))[0]
     area = volumes(places[corners]) * signs
     out = corners.copy()
     turned = signs * np.sign(np.bincount(sheet, area))[sheet] < 0
     out[turned] = out[turned][:, ::-1]
     kept, outer = keys_of(fixed, base), keys_of(whole.facets[apart], base)
+    area = volumes(places[out])
     for _ in range(ROUNDS):
-        area = volumes(places[out])
         bad = np.flatnonzero(area < 0.0)
         bad = bad[np.argsort(area[bad], kind="stable")]
-        if len(bad) == 0 or not _flip_once(out, places, bad, kept, outer):
+        flipped = _flip_once(out, places, bad, kept, outer) if len(bad) else []
+        if not flipped:
             break
+        area[flipped] = volumes(places[out[flipped]])
     return out
 
 
@@ -173,25 +180,26 @@ def _flip_once(
     bad: Items,
     kept: Int[np.ndarray, " kept"],
     outer: Int[np.ndarray, " outer"],
-) -> int:
-    """Flip an edge of each bad triangle where that helps; changes `corners`."""
+) -> list[int]:
+    """Flip an edge of each bad triangle where that helps; changes `corners`. Return the flipped."""
     base, near = len(places), np.zeros(len(places), bool)
     near[corners[bad]] = True
-    cells = np.flatnonzero(near[corners].any(axis=1))
+    cells = np.flatnonzero(count_corners(near, corners))
     keys = np.concatenate([keys_of(corners[cells][:, k], base) for k in OPPOSITE])
     around = _Around(keys, np.tile(cells, 3)).without(outer)
-    flips = _best_flips(corners, places, bad, around, kept)
-    touched: set[int] = set()
-    count = 0
-    for cell, other, *new in zip(*(each.tolist() for each in flips), strict=True):
-        if touched & {cell, other}:
-            continue
-        corners[cell], corners[other] = new
-        # their neighbours are computed again in the next round
-        sides = np.array(new)[:, OPPOSITE].reshape(-1, 2)
-        touched |= {cell, other, *around.beside(keys_of(sides, base)).tolist()}
-        count += 1
-    return count
+    cell, other, *new = _best_flips(corners, places, bad, around, kept)
+    # their neighbours are computed again in the next round
+    sides = np.stack(new, axis=1)[:, :, OPPOSITE].reshape(-1, 2)
+    of_side, neighbours = around.beside(keys_of(sides, base))
+    ends = np.searchsorted(of_side, 6 * np.arange(len(cell) + 1))
+    flips = zip(cell.tolist(), other.tolist(), pairwise(ends.tolist()), strict=True)
+    touched, chosen = set[int](), []
+    for k, (one, two, (first, last)) in enumerate(flips):
+        if not touched & {one, two}:
+            touched |= {one, two, *neighbours[first:last].tolist()}
+            chosen.append(k)
+    corners[cell[chosen]], corners[other[chosen]] = (each[chosen] for each in new)
+    return [*cell[chosen].tolist(), *other[chosen].tolist()]
 
 
 @dataclass(frozen=True)
@@ -207,10 +215,11 @@ class _Around:
         left = left[np.argsort(self.keys[left], kind="stable")]
         return _Around(self.keys[left], self.cells[left])
 
-    def beside(self, keys: Items) -> Some:
-        """Cells that have edges."""
+    def beside(self, keys: Items) -> tuple[Some, Some]:
+        """Edge by edge, which it is, and the cells that have it."""
         first, last = (np.searchsorted(self.keys, keys, side) for side in ("left", "right"))
-        return np.asarray(self.cells[runs(first, last - first)[1]])
+        edge, place = runs(first, last - first)
+        return edge, self.cells[place]
 
     def others(self, keys: Items, cells: Items) -> tuple[Some, Some]:
         """Which cells share an edge with just one other cell, and this one."""

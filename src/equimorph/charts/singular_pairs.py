@@ -13,15 +13,30 @@ See docs/decisions.md, "Pairs of states near singular curves are found from stat
 from each other".
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from equimorph.arrays import Float, Frames, Items, Place, Places, Points, Rows, Values
+from equimorph.arrays import (
+    Flags,
+    Float,
+    Frames,
+    Int,
+    Items,
+    Lanes,
+    Parameters,
+    Place,
+    Places,
+    Points,
+    Rows,
+    Some,
+    Values,
+)
 from equimorph.charts.coordinates import Coordinates, Square, settle_on_set, solve_on_the_set
 from equimorph.charts.location import Cells, Found
+from equimorph.columns import Columns
 from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.geometry.tangents import frames_in_embedding, split_step, tangent_frames
@@ -30,6 +45,8 @@ from equimorph.structures import States, join_states
 
 NEIGHBOURS = 8
 """Nearly singular states from which the pair over a point is predicted."""
+STARTS = 64
+"""Vertices, the nearest ones by their coordinates, from which these states are computed."""
 NEARLY = 0.3
 """Share of det J to which it falls from one cell to the next where it may vanish beside them."""
 REACH = 1.0
@@ -41,12 +58,17 @@ Numbers = Items
 
 
 @dataclass(frozen=True, eq=False)
-class _Bend:
+class _Bend(Columns):
     """How the coordinates bend at nearly singular states; J in ranges of the coordinates.
 
-    slope: J⁺ without v. normal: u. least: σ. null: v. curvature: H.
+    z, p: the states. frames: tangent spaces. values: coordinates in their ranges. slope: J⁺ without
+    v. normal: u. least: σ. null: v. curvature: H.
     """
 
+    z: Lanes
+    p: Parameters
+    frames: Frames
+    values: Places
     slope: Float[np.ndarray, "singular d d"]
     normal: Float[np.ndarray, "singular d"]
     least: Values
@@ -55,60 +77,51 @@ class _Bend:
 
 
 @dataclass(frozen=True, eq=False)
-class SingularPairs:
-    """Search for pairs of states beside the nearly singular states of some coordinates.
+class _Nearly:
+    """Nearly singular states of coordinates.
 
     Parameters
     ----------
-    cells
-        Cells of the chart.
+    coordinates, ranges
+        The coordinates, and their ranges over the set.
     states
-        States near which its coordinates fold.
+        The states.
     rows
         Planes near the tangent spaces there.
     """
 
-    cells: Cells
+    coordinates: Coordinates
+    ranges: Place
     states: States
     rows: Rows
 
-    @property
-    def coordinates(self) -> Coordinates:
-        """The coordinates that fold."""
-        return self.cells.coordinates
-
-    @property
-    def _ranges(self) -> Place:
-        return self.cells.ranges
-
     @cached_property
-    def _frames(self) -> Frames:
+    def frames(self) -> Frames:
         """Tangent spaces at the states."""
         return tangent_frames(self.coordinates.setting, self.states.z, self.states.p, self.rows)
 
     @cached_property
-    def _tree(self) -> cKDTree:
-        return cKDTree(self.coordinates(self.states.z, self.states.p) / self._ranges)
-
-    @cached_property
-    def _values(self) -> tuple[Square, np.ndarray, Square]:
+    def values(self) -> tuple[Square, np.ndarray, Square]:
         """Singular vectors and values of J."""
         left, size, right = np.linalg.svd(self._jacobian(self.states.z, self.states.p))
         return left, size, right
 
-    @cached_property
-    def _bend(self) -> _Bend:
-        left, size, right = self._values
-        inverse = np.zeros_like(size)
+    @property
+    def bend(self) -> _Bend:
+        """How the coordinates bend at the states."""
+        left, size, right = self.values
+        z, p, inverse = self.states.z, self.states.p, np.zeros_like(size)
         inverse[:, :-1] = 1.0 / np.maximum(size[:, :-1], 1e-300)
         slope = np.einsum("nkj,nk,nik->nji", right, inverse, left)
-        columns = [self._change(self._frames[:, k]) for k in range(size.shape[1])]
-        return _Bend(slope, left[:, :, -1], size[:, -1], right[:, -1], np.stack(columns, axis=2))
+        columns = [self._change(self.frames[:, k]) for k in range(size.shape[1])]
+        first, second = (left[:, :, -1], size[:, -1]), (right[:, -1], np.stack(columns, axis=2))
+        here = self.coordinates(z, p) / self.ranges
+        return _Bend(z, p, self.frames, here, slope, *first, *second)
 
     def _change(self, tangent: Float[np.ndarray, "n full"]) -> Float[np.ndarray, "n d"]:
         """Derivative of uᵀJ along tangents."""
         dz, dp = split_step(self.coordinates.setting, STEP * tangent)
-        left, size, right = self._values
+        left, size, right = self.values
         there = self._jacobian(self.states.z + dz, self.states.p + dp)
         here = size[:, -1, None] * right[:, -1]
         return np.asarray((np.einsum("ni,nij->nj", left[:, :, -1], there) - here) / STEP)
@@ -116,36 +129,103 @@ class SingularPairs:
     def _jacobian(self, z: np.ndarray, p: np.ndarray) -> Square:
         """Derivatives of the coordinates, in their ranges, along tangents."""
         setting = self.coordinates.setting
-        frames = tangent_frames(setting, z, p, frames_in_embedding(setting, self._frames))
-        return np.asarray(self.coordinates.derivative(z, p, frames) / self._ranges[:, None])
+        frames = tangent_frames(setting, z, p, frames_in_embedding(setting, self.frames))
+        return np.asarray(self.coordinates.derivative(z, p, frames) / self.ranges[:, None])
 
-    def nearer(self) -> "SingularPairs":
-        """Search from where short steps of Newton's method along v take the states."""
-        setting, (_, size, right) = self.coordinates.setting, self._values
-        null = np.einsum("nd,ndf->nf", right[:, -1], self._frames)
+    def nearer(self, longest: float) -> tuple["_Nearly", Some]:
+        """Where short steps of Newton's method along v take the states, and which these are."""
+        setting, (_, size, right) = self.coordinates.setting, self.values
+        null = np.einsum("nd,ndf->nf", right[:, -1], self.frames)
         bend = np.einsum("nd,nd->n", self._change(null), right[:, -1])
         with np.errstate(divide="ignore", invalid="ignore"):
             t = -size[:, -1] / bend
-        some = np.flatnonzero(np.abs(t) <= self._longest)
+        some = np.flatnonzero(np.abs(t) <= longest)
         dz, dp = split_step(setting, t[some, None] * null[some])
-        states, rows = self.states[some], frames_in_embedding(setting, self._frames[some])
+        states, rows = self.states[some], frames_in_embedding(setting, self.frames[some])
         moved = settle_on_set(setting, states.z + dz, states.p + dp, rows)
         found = np.flatnonzero(moved.found)
         states = States(states.structure, moved.z[found], moved.p[found])
-        return SingularPairs(self.cells, states, rows[found])
+        return replace(self, states=states, rows=rows[found]), some[found]
+
+
+@dataclass(frozen=True, eq=False)
+class SingularPairs:
+    """Search for pairs of states beside the nearly singular states of some coordinates.
+
+    These states are computed near the points that are asked for, and kept.
+
+    Parameters
+    ----------
+    cells
+        Cells of the chart.
+    vertices
+        Vertices of the set beside which its coordinates fold.
+    """
+
+    cells: Cells
+    vertices: Numbers
+
+    @property
+    def coordinates(self) -> Coordinates:
+        """The coordinates that fold."""
+        return self.cells.coordinates
+
+    @cached_property
+    def _rows(self) -> Rows:
+        """Planes near the tangent spaces at the vertices: those of their largest cells."""
+        cells, largest = self.cells, np.zeros(len(self.cells.eset.points), int)
+        order = np.argsort(cells.extents, kind="stable")
+        largest[cells.corners[order]] = order[:, None]
+        return cells.planes(largest[self.vertices])
+
+    @cached_property
+    def _tree(self) -> cKDTree:
+        return cKDTree(self.cells.values[self.vertices] / self.cells.ranges)
+
+    @cached_property
+    def _kept(self) -> list[tuple[Flags, Numbers, _Bend]]:
+        """What was computed last, if anything was; other threads may work with the one before.
+
+        Whether each vertex was asked for, the row of its state, −1 without one, and the states.
+        """
+        return []
+
+    def _bend_near(self, some: Numbers) -> tuple[_Bend, Int[np.ndarray, " found"]]:
+        """Nearly singular states that are found from vertices, and from which of these."""
+        cells, states = self.cells, self.cells.eset.points[self.vertices[some]]
+        start = _Nearly(cells.coordinates, cells.ranges, states, self._rows[some])
+        found, of = start.nearer(self._longest)
+        return found.bend, some[of]
+
+    def _singular(
+        self, near: Int[np.ndarray, "points starts"]
+    ) -> tuple[Int[np.ndarray, "points starts"], _Bend]:
+        """Rows of the nearly singular states that belong to vertices, and all known ones."""
+        count, kept = len(self.vertices), self._kept[-1:]
+        asked, row, *bends = kept[0] if kept else (np.zeros(count, bool), np.full(count, -1))
+        new = np.unique(near[~asked[near]])
+        if len(new):
+            more, of = self._bend_near(new)
+            asked, row = asked.copy(), row.copy()
+            asked[new] = True
+            row[of] = sum(len(each.least) for each in bends) + np.arange(len(of))
+            bends = [_Bend.concatenate([*bends, more])]
+            self._kept[:] = [(asked, row, bends[0])]
+        return row[near], bends[0]
 
     def add_to(self, found: Found, points: Points) -> Found:
         """States found over points, and those of pairs beside the singular states."""
-        setting, structure = self.coordinates.setting, self.states.structure
+        if len(points) == 0:
+            return found
+        setting, structure = self.coordinates.setting, self.cells.eset.structure
         point, near, step = self._predict(points)
         if len(point) == 0:
             return found
-        tangent = np.einsum("nd,ndf->nf", step, self._frames[near])
+        tangent = np.einsum("nd,ndf->nf", step, near.frames)
         dz, dp = split_step(setting, tangent)
-        start = self.states[near]
-        rows = frames_in_embedding(setting, self._frames[near])
-        own = solve_on_the_set(self.coordinates, start.z + dz, start.p + dp, points[point], rows)
-        moved = embed(setting, own.z, own.p) - embed(setting, start.z, start.p)
+        rows = frames_in_embedding(setting, near.frames)
+        own = solve_on_the_set(self.coordinates, near.z + dz, near.p + dp, points[point], rows)
+        moved = embed(setting, own.z, own.p) - embed(setting, near.z, near.p)
         good = own.found & (np.linalg.norm(moved, axis=1) <= 2.0 * self._longest)
         some = np.flatnonzero(good)
         states, point = States(structure, own.z[some], own.p[some]), point[some]
@@ -156,31 +236,35 @@ class SingularPairs:
         )
         return unite(self.cells, found, new)
 
-    @property
+    @cached_property
     def _longest(self) -> float:
         return REACH * float(self.cells.sizes.max())
 
-    def _predict(self, points: Points) -> tuple[Numbers, Numbers, Places]:
+    def _predict(self, points: Points) -> tuple[Numbers, _Bend, Places]:
         """Points with a pair near by, the singular states it is predicted from, and the steps."""
-        count, d = min(NEIGHBOURS, len(self.states)), points.shape[1]
-        scaled, bend = points / self._ranges, self._bend
-        near = self._tree.query(scaled, k=np.arange(1, count + 1))[1].ravel()
-        point = np.repeat(np.arange(len(points)), count)
-        rest = scaled[point] - self._tree.data[near]
-        along, null = np.einsum("nji,ni->nj", bend.slope[near], rest), bend.null[near]
-        curvature = bend.curvature[near]
+        scaled, starts = points / self.cells.ranges, min(STARTS, len(self.vertices))
+        rows, whole = self._singular(self._tree.query(scaled, k=np.arange(1, starts + 1))[1])
+        gap = np.full(rows.shape, np.inf)
+        some = np.nonzero(rows >= 0)
+        gap[some] = np.linalg.norm(scaled[some[0]] - whole.values[rows[some]], axis=1)
+        chosen = np.argsort(gap, axis=1, kind="stable")[:, :NEIGHBOURS]
+        point, place = np.nonzero(np.isfinite(np.take_along_axis(gap, chosen, axis=1)))
+        bend = whole.take(rows[point, chosen[point, place]])
+        rest = scaled[point] - bend.values
+        along, null = np.einsum("nji,ni->nj", bend.slope, rest), bend.null
         a, b, c = (
-            np.einsum("ni,nij,nj->n", one, curvature, other)
+            np.einsum("ni,nij,nj->n", one, bend.curvature, other)
             for one, other in ((null, null), (null, along), (along, along))
         )
-        b, c = b + bend.least[near], 0.5 * c - (bend.normal[near] * rest).sum(axis=1)
+        b, c = b + bend.least, 0.5 * c - (bend.normal * rest).sum(axis=1)
         with np.errstate(divide="ignore", invalid="ignore"):
             # the sign of the discriminant is not certain where it is small: Newton decides
             half, middle = np.sqrt(np.abs(b**2 - 2.0 * a * c)) / np.abs(a), -b / a
         steps = [along + (middle + sign * half)[:, None] * null for sign in (1.0, -1.0)]
         good = np.max([np.linalg.norm(step, axis=1) for step in steps], axis=0) <= self._longest
-        both = np.concatenate([step[good] for step in steps]).reshape(-1, d)
-        return np.tile(point[good], 2), np.tile(near[good], 2), both
+        both = np.concatenate([step[good] for step in steps])
+        own = np.tile(np.flatnonzero(good), 2)
+        return point[own], bend.take(own), both
 
 
 def pairs_of(cells: Cells) -> SingularPairs | None:
@@ -194,11 +278,7 @@ def pairs_of(cells: Cells) -> SingularPairs | None:
     near[cells.whole.across[np.minimum(a, b) < NEARLY * np.maximum(a, b)]] = True
     vertices = np.unique(cells.whole.facets[near])
     vertices = vertices[cells.eset.kinds[vertices] != VertexKind.CROSSING]
-    largest, order = np.zeros(len(cells.eset.points), int), np.argsort(cells.extents, kind="stable")
-    largest[cells.corners[order]] = order[:, None]
-    rows = cells.planes(largest[vertices])
-    found = SingularPairs(cells, cells.eset.points[vertices], rows).nearer()
-    return found if len(found.states) else None
+    return SingularPairs(cells, vertices) if len(vertices) else None
 
 
 def unite(cells: Cells, first: Found, second: Found) -> Found:

@@ -4,12 +4,13 @@ They are kept in the set itself, because a table of weak keys could not hold wha
 """
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import wraps
 from typing import Any, TypeVar
 
 import numpy as np
 
-from equimorph.arrays import Float
+from equimorph.arrays import Cells, Float
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.geometry.topology import Adjacency, adjacency
@@ -18,6 +19,8 @@ Table = TypeVar("Table")
 
 TABLES = "_kept_tables"
 """Attribute of a set that holds its tables; neither pickles nor copies of a set have them."""
+PLACES = "places"
+"""Key of the places of vertices."""
 
 
 def from_cache(eset: EquilibriumSet, key: Any, compute: Callable[[], Table]) -> Table:
@@ -50,7 +53,19 @@ def adjacency_of(eset: EquilibriumSet) -> Adjacency:
     return adjacency(eset.cells)
 
 
-@kept
 def places_of(eset: EquilibriumSet) -> Float[np.ndarray, "V coordinates"]:
-    """Vertices of a set in its metric; see `embed`."""
-    return embed(eset.setting, eset.points.z, eset.points.p)
+    """Vertices of a set in its metric, see `embed`; kept."""
+    return from_cache(eset, PLACES, lambda: _places(eset))
+
+
+def _places(eset: EquilibriumSet) -> Float[np.ndarray, "V coordinates"]:
+    found = embed(eset.setting, eset.points.z, eset.points.p)
+    found.flags.writeable = False
+    return found
+
+
+def with_cells(eset: EquilibriumSet, cells: Cells) -> EquilibriumSet:
+    """A set with other cells on the same vertices, whose tables it shares."""
+    made = replace(eset, cells=cells)
+    from_cache(made, PLACES, lambda: places_of(eset))
+    return made

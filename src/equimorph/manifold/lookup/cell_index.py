@@ -11,12 +11,17 @@ from equimorph.manifold.lookup.kernels import cells_by_bin, cells_near
 
 MOST_BINS = 4
 """Bins per cell, at most."""
+MOST_ENTRIES = 16
+"""Bins that each cell is listed in, on average, at most. Where few cells reach far, finer bins list
+as many of these, and no fewer are tried for a point."""
+COARSER = 0.7
+"""Share of the bins along each parameter that is left where there are too many entries."""
 NUDGE = 1e-9
 """Shift, in ranges of the parameters, that puts points between cells into one of them."""
 FLAT = 1e-15
 """Volume, in the unit cube, below which a cell has no barycentric coordinates."""
-TRIANGLE = 3
-"""Number of corners."""
+PLANE = 2
+"""Number of parameters."""
 
 
 @dataclass(frozen=True)
@@ -74,25 +79,25 @@ class CellIndex:
             to be found near it, in barycentric coordinates.
         """
         d = corners.shape[2]
-        flat = corners.reshape(-1, d)
-        lower = flat.min(axis=0) if len(flat) else np.zeros(d)
-        width = flat.max(axis=0) - lower if len(flat) else np.ones(d)
+        # one coordinate of one corner a row: rows of few numbers are slow to reduce
+        unit = np.ascontiguousarray(corners.T)
+        flat = unit.reshape(d, -1)
+        lower = flat.min(axis=1) if flat.size else np.zeros(d)
+        width = flat.max(axis=1) - lower if flat.size else np.ones(d)
         width = np.where(width > 0.0, width, 1.0)
-        unit = (corners - lower) / width
-        low = high = unit[:, 0]
-        for k in range(1, d + 1):  # rows of few numbers are slow to reduce
-            low, high = np.minimum(low, unit[:, k]), np.maximum(high, unit[:, k])
-        extent = high - low
-        overhang = np.ascontiguousarray(np.broadcast_to(overhang.T, (d + 1, len(corners))).T)
+        unit = (unit - lower[:, None, None]) / width[:, None, None]
+        low, high = unit.min(axis=1), unit.max(axis=1)
+        around = np.broadcast_to(overhang.T, (d + 1, len(corners)))
         # a corner moves with the facets opposite to the other corners
-        room = np.sort(overhang, axis=1)[:, 1:].sum(axis=1, keepdims=True) * extent
-        counts = _bins(extent + 2.0 * room)
+        room = (around.sum(axis=0) - around.min(axis=0)) * (high - low)
+        counts = _bins(high - low + 2.0 * room)
         first, last = (
-            np.clip((side * counts).astype(int), 0, counts - 1)
+            np.clip((side.T * counts).astype(int, order="C"), 0, counts - 1)
             for side in (low - room, high + room)
         )
         starts, cells = cells_by_bin(first, last, counts)
-        return cls(lower, width, counts, starts, cells, _maps(unit), overhang)
+        maps, overhang = _maps(unit), np.ascontiguousarray(around.T)
+        return cls(lower, width, counts, starts, cells, maps, overhang)
 
     def near(self, points: Places) -> Hits:
         """Cells that contain points or that these miss by at most their overhang."""
@@ -106,30 +111,35 @@ class CellIndex:
         return np.asarray(np.einsum("nij,nj->ni", maps[:, :, :-1], unit) + maps[:, :, -1])
 
 
-def _bins(extent: Float[np.ndarray, "C d"]) -> Int[np.ndarray, " d"]:
+def _bins(reach: Float[np.ndarray, "d C"]) -> Int[np.ndarray, " d"]:
     """Number of bins along each parameter: halves of what typical cells reach, but not too many."""
-    typical = np.median(extent, axis=0) if len(extent) else np.ones(extent.shape[1])
+    d, cells = reach.shape
+    typical = np.median(reach, axis=1) if cells else np.ones(d)
     counts = np.clip(np.round(2.0 / np.maximum(typical, 1e-6)), 1, None)
-    share = MOST_BINS * max(len(extent), 1) / counts.prod()
-    fitting = np.maximum(counts * min(1.0, share ** (1.0 / len(counts))), 1)
-    return np.asarray(fitting.astype(int))
+    share = MOST_BINS * max(cells, 1) / counts.prod()
+    counts = np.maximum(counts * min(1.0, share ** (1.0 / d)), 1).astype(int)
+    while counts.max() > 1:
+        entries = np.prod(1.0 + reach * counts[:, None], axis=0)
+        if entries.sum() <= MOST_ENTRIES * cells:
+            break
+        counts = np.maximum(COARSER * counts, 1).astype(int)
+    return np.asarray(counts)
 
 
-def _maps(unit: Float[np.ndarray, "C corners d"]) -> Float[np.ndarray, "C corners corners"]:
+def _maps(unit: Float[np.ndarray, "d corners C"]) -> Float[np.ndarray, "C corners corners"]:
     """Inverse of the matrix of each cell's corners over ones."""
-    ones = np.ones((*unit.shape[:2], 1))
-    homogeneous = np.concatenate([unit, ones], axis=2)
-    flat = np.abs(volumes(unit)) < FLAT
-    homogeneous[flat] = np.eye(homogeneous.shape[1])
-    if unit.shape[1] == TRIANGLE:  # the products of two corners are all minors
-        x, y, ones = homogeneous.T
-        maps = np.empty(homogeneous.shape)
+    size = volumes(unit.T)
+    flat = np.abs(size) < FLAT
+    if len(unit) == PLANE:  # the products of two corners are all minors
+        (x, y), maps = unit, np.empty((len(size), 3, 3))
+        by = 0.5 / np.where(flat, 1.0, size)
         for k, (i, j) in enumerate(((1, 2), (2, 0), (0, 1))):
-            maps[:, k, 0] = y[i] * ones[j] - ones[i] * y[j]
-            maps[:, k, 1] = ones[i] * x[j] - x[i] * ones[j]
-            maps[:, k, 2] = x[i] * y[j] - y[i] * x[j]
-        maps /= np.einsum("ci,ci->c", homogeneous[:, 0], maps[:, 0])[:, None, None]
+            maps[:, k, 0] = (y[i] - y[j]) * by
+            maps[:, k, 1] = (x[j] - x[i]) * by
+            maps[:, k, 2] = (x[i] * y[j] - y[i] * x[j]) * by
     else:
-        maps = np.linalg.inv(np.swapaxes(homogeneous, 1, 2))
+        homogeneous = np.concatenate([unit, np.ones((1, *unit.shape[1:]))]).transpose(2, 0, 1)
+        homogeneous[flat] = np.eye(homogeneous.shape[1])
+        maps = np.linalg.inv(homogeneous)
     maps[flat] = np.nan
     return np.asarray(maps)

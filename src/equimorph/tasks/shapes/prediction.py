@@ -16,7 +16,7 @@ from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet, Level, level_set
 from equimorph.manifold.complex.kept_tables import from_cache, places_of
 from equimorph.manifold.geometry.setting import Setting, embed
-from equimorph.manifold.geometry.simplices import longest_sides, middles
+from equimorph.manifold.geometry.simplices import longest_sides, middles, volumes
 from equimorph.manifold.geometry.topology import faces_of, pieces
 from equimorph.manifold.lookup.cell_index import CellIndex, Hits
 from equimorph.manifold.queries.nearest import SetPoints, local_minima, points_at_vertices
@@ -135,12 +135,8 @@ class Predictor:
         Cells of one index on which the descriptors move with the parameters in the same sense.
         """
         eset = self.eset
-        first, rest = eset.cells[:, 0], eset.cells[:, 1:]
-        moves = (
-            np.sign(np.linalg.det(each[rest] - each[first][:, None]))
-            for each in (self.values, eset.coordinates)
-        )
-        return np.asarray(2 * eset.cell_index + (next(moves) * next(moves) > 0), int)
+        moves = [np.sign(volumes(each[eset.cells])) for each in (self.values, eset.coordinates)]
+        return np.asarray(2 * eset.cell_index + (moves[0] * moves[1] > 0), int)
 
     def _different(self, hits: Hits, known: Found | None) -> Items:
         """Predictions that are not close to an earlier one from the same side of folds.
