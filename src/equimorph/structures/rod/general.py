@@ -32,7 +32,8 @@ from equimorph.structures.rod.general_step_kernels import advance_lanes
 from equimorph.structures.rod.mechanics import LARGEST_TAIL
 from equimorph.structures.rod.model import RodModel, pack_tables
 from equimorph.structures.rod.planar_energy import PlanarEnergy
-from equimorph.structures.rod.pressure import EnclosedArea, lower_triangle
+from equimorph.structures.rod.pressure import EnclosedArea
+from equimorph.structures.rod.pressure_kernels import press_entries, press_lanes
 from equimorph.structures.rod.reflections import symmetries
 
 Points = Float[np.ndarray, "lanes points"]
@@ -222,22 +223,24 @@ class GeneralMechanics(GeneralInertia):
         )
         over_lanes(linearise_lanes, self._step_data, [z, p, dp], out)
         if self._area is not None:
-            force, change = self._press(self._area, z, p, dp)
-            out = (out[0] + force, out[1] + change, *out[2:])
+            n = self.unknowns
+            more = np.empty((lanes, n)), np.empty((lanes, n)), np.empty((lanes, n))
+            over_lanes(press_lanes, self._pressed, [z, p, dp], more)
+            places = (slice(n), slice(n), self.unknown_nodes)
+            for own, place, pressed in zip(out, places, more, strict=False):
+                own[:, place] += pressed
         return out
 
-    def _press(
-        self, area: EnclosedArea, z: Lanes, p: Parameters, dp: Parameters
-    ) -> tuple[Lanes, Lanes]:
-        """Pressure's part of F and F_p·dp."""
-        theta, pull = self.nodal_angles(z, p), self._pressure(self.scalars(z, p))[:, None]
-        moved, change = self._velocity(np.zeros_like(z), dp)
-        force = area.gradient(theta)
-        turn = pull * area.gradient_derivative(theta, moved) + change * force
-        residual, column = np.zeros((2, *z.shape))
-        residual[:, : self.unknowns] = -(pull * force)[:, self.unknown_nodes]
-        column[:, : self.unknowns] = -turn[:, self.unknown_nodes]
-        return residual, column
+    @cached_property
+    def _pressed(self) -> tuple[object, ...]:
+        """Tables of `press_lanes`."""
+        area, turned = self._area, np.ascontiguousarray(self.model.turned)
+        assert area is not None
+        closed = np.array([area.closed.real, area.closed.imag])
+        weights = np.ascontiguousarray(area.weights.real)
+        first = np.int64(self.unknown_nodes.start)
+        pressure = np.ascontiguousarray(self.model.pressure)
+        return np.ascontiguousarray(area.matrix), weights, closed, pressure, turned, first
 
     def _velocity(self, v_z: Lanes, v_p: Parameters) -> tuple[Nodal, Float[np.ndarray, "lanes 1"]]:
         """Change of the nodal angles and of the pressure along a direction."""
@@ -286,7 +289,7 @@ class GeneralMechanics(GeneralInertia):
         if shift is not None:
             diagonal = diagonal - shift[:, None] * self.mesh.weights
         if self._area is not None:
-            entries = self._pressed_entries(self._area, z, p, diagonal, gradients, trailing)
+            entries = self._pressed_entries(z, p, diagonal, gradients, trailing)
             return lambda rhs, border: self._full_layout.solve(entries, border, rhs)
 
         def solve(rhs: Sides, border: AnyBorder) -> BorderedSolution:
@@ -302,7 +305,6 @@ class GeneralMechanics(GeneralInertia):
 
     def _pressed_entries(
         self,
-        area: EnclosedArea,
         z: Lanes,
         p: Parameters,
         diagonal: Nodal,
@@ -310,11 +312,13 @@ class GeneralMechanics(GeneralInertia):
         trailing: Float[np.ndarray, "lanes m m"],
     ) -> Float[np.ndarray, "lanes entries"]:
         """Entries of F_z of a rod under pressure."""
-        inner = self.unknown_nodes
-        theta, pull = self.nodal_angles(z, p), self._pressure(self.scalars(z, p))[:, None]
-        own = (diagonal - pull * area.curvature(theta))[:, inner]
-        angles, stiff = theta[:, inner], self.layout.assembled[inner, inner]
-        return lower_triangle(angles, pull, stiff, area, inner, own, border[:, :, inner], trailing)
+        inner, size = self.unknown_nodes, self.size
+        stiff = np.ascontiguousarray(self.layout.assembled[inner, inner])
+        inputs = [z, p, *(each[..., inner] for each in (diagonal, border)), trailing]
+        entries = np.empty((len(z), size * (size + 1) // 2))
+        inputs = [np.ascontiguousarray(each) for each in inputs]
+        over_lanes(press_entries, (*self._pressed, stiff), inputs, [entries])
+        return entries
 
     def advance(
         self, z: Lanes, p: Parameters, dp: Parameters, row: Lanes, corner: Values, defect: Values

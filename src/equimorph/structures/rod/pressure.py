@@ -9,7 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
-from equimorph.arrays import Complex, Entries, Float, Int, Nodal, Values
+from equimorph.arrays import Complex, Float, Int, Nodal, Values
 from equimorph.linalg.dense import multiply
 from equimorph.structures.rod.discretisation import Mesh
 
@@ -164,36 +164,6 @@ Square = Float[np.ndarray, "unknowns unknowns"]
 
 BLOCK = 128
 """Matrices that are assembled together: the cost of a call is small against theirs."""
-
-
-def lower_triangle(
-    theta: Angles,
-    pull: Float[np.ndarray, "lanes 1"],
-    stiffness: Square,
-    area: EnclosedArea,
-    inner: slice,
-    diagonal: Angles,
-    border: Float[np.ndarray, "lanes m unknowns"],
-    trailing: Float[np.ndarray, "lanes m m"],
-) -> Entries:
-    """Entries of F_z, row by row: ``K_ij − p ∂²V/∂θ_i∂θ_j``, then the multipliers' rows.
-
-    Of unknown angles θ under the pull p, which are the `inner` nodes of the area V; `diagonal` are
-    further terms of the diagonal, `border` the gradients of the multipliers' constraints,
-    `trailing` the block of the multipliers.
-    """
-    (lanes, n), m = theta.shape, border.shape[1]
-    entries = np.empty((lanes, (n + m) * (n + m + 1) // 2))
-    for start in range(0, lanes, BLOCK):
-        some = slice(start, start + BLOCK)
-        angles = pressed_rows(theta[some], pull[some], stiffness, area.part(inner))
-        entries[some, : n * (n + 1) // 2] = angles.T
-    entries[:, row_ends(0, n)] += diagonal
-    for k, stop in enumerate(row_ends(n, n + m)):
-        first = stop - n - k
-        entries[:, first : first + n] = border[:, k]
-        entries[:, first + n : stop + 1] = trailing[:, k, : k + 1]
-    return entries
 
 
 def pressed_rows(
