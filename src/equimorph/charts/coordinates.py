@@ -72,7 +72,7 @@ def solve_over_parameters(
     """
     setting, structure = scalars.setting, scalars.setting.structure
     given, asked = scalars.places >= 0, np.flatnonzero(scalars.places < 0)
-    unknown = np.setdiff1d(setting.free, scalars.places)
+    unknown = np.array([k for k in setting.free.tolist() if k not in scalars.places.tolist()], int)
     z, p, wanted = z[tried], p[tried], wanted[tried]
     p[:, scalars.places[given]] = wanted[:, given]
     functions = tuple(scalars.scalars[k].function for k in asked)

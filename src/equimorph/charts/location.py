@@ -320,6 +320,8 @@ class Cells:
 
         From the nearest one; if the cell contains the point, from all.
         """
+        if len(again) == 0:
+            return z, p, good
         z, p, good = z.copy(), p.copy(), good.copy()
         far = are_singular(self.eset.kinds)[self.corners[hits.cell[again]]]
         nearest = np.argsort(1e9 * far - hits.weights[again], axis=1)

@@ -249,14 +249,15 @@ class SingularPairs:
         gap[some] = np.linalg.norm(scaled[some[0]] - whole.values[rows[some]], axis=1)
         chosen = np.argsort(gap, axis=1, kind="stable")[:, :NEIGHBOURS]
         point, place = np.nonzero(np.isfinite(np.take_along_axis(gap, chosen, axis=1)))
-        bend = whole.take(rows[point, chosen[point, place]])
-        rest = scaled[point] - bend.values
-        along, null = np.einsum("nji,ni->nj", bend.slope, rest), bend.null
+        row = rows[point, chosen[point, place]]
+        rest = scaled[point] - whole.values[row]
+        along, null = np.einsum("nji,ni->nj", whole.slope[row], rest), whole.null[row]
+        curvature = whole.curvature[row]
         a, b, c = (
-            np.einsum("ni,nij,nj->n", one, bend.curvature, other)
+            np.einsum("ni,nij,nj->n", one, curvature, other)
             for one, other in ((null, null), (null, along), (along, along))
         )
-        b, c = b + bend.least, 0.5 * c - (bend.normal * rest).sum(axis=1)
+        b, c = b + whole.least[row], 0.5 * c - (whole.normal[row] * rest).sum(axis=1)
         with np.errstate(divide="ignore", invalid="ignore"):
             # the sign of the discriminant is not certain where it is small: Newton decides
             half, middle = np.sqrt(np.abs(b**2 - 2.0 * a * c)) / np.abs(a), -b / a
@@ -264,7 +265,7 @@ class SingularPairs:
         good = np.max([np.linalg.norm(step, axis=1) for step in steps], axis=0) <= self._longest
         both = np.concatenate([step[good] for step in steps])
         own = np.tile(np.flatnonzero(good), 2)
-        return point[own], bend.take(own), both
+        return point[own], whole.take(row[own]), both
 
 
 def pairs_of(cells: Cells) -> SingularPairs | None:

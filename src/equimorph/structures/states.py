@@ -61,7 +61,10 @@ class States(Tabular):
             return self.p[:, position(self.structure.parameters, key)]
         if isinstance(key, int | np.integer):
             return State(self.structure, self.z[key], self.p[key])
-        return States(self.structure, self.z[key], self.p[key])
+        some = States(self.structure, self.z[key], self.p[key])
+        if "index" in vars(self):  # what was computed is kept
+            vars(some)["index"] = self.index[key]
+        return some
 
     def __repr__(self) -> str:
         """Kind and number."""
@@ -227,7 +230,10 @@ def join_states(structure: Structure, parts: Iterable[Points]) -> States:
     given = list(parts)
     z = [np.zeros((0, structure.size)), *(np.atleast_2d(each.z) for each in given)]
     p = [np.zeros((0, len(structure.parameters))), *(np.atleast_2d(each.p) for each in given)]
-    return States(structure, np.concatenate(z), np.concatenate(p))
+    states = States(structure, np.concatenate(z), np.concatenate(p))
+    if given and all("index" in vars(each) for each in given):
+        vars(states)["index"] = np.concatenate([vars(each)["index"] for each in given])
+    return states
 
 
 @dataclass(frozen=True, eq=False)

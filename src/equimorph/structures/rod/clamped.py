@@ -52,6 +52,8 @@ LOAD_DEGREE = 16
 """Degree of the polynomials by which the load is represented inside an element."""
 NEGLIGIBLE = 1e-13
 """Legendre coefficients of ρ that are smaller, relative to the largest |ρ|, are round-off."""
+KEPT = 256
+"""Arclengths whose places in the mesh are kept: descriptors ask for the same one many times."""
 
 
 class ClampedMechanics(PlanarMechanics):
@@ -309,9 +311,7 @@ class ClampedFields:
         self, z: Lanes, p: Parameters, s: Float[np.ndarray, " points"]
     ) -> Float[np.ndarray, "lanes points 4"]:
         """(θ, κ, x, y) at arclengths."""
-        element, t = self.mesh.locate(s)
-        side = (t > 0.5).astype(np.int64)
-        distance = s - self.mesh.breaks[element + side]
+        element, side, distance = self._nearest_vertices(s)
         out = np.empty((len(z), 4 * len(s)))
         shared = (
             self.stiffness,
@@ -325,6 +325,23 @@ class ClampedFields:
         )
         over_lanes(fields_lanes, shared, [z, p], [out])
         return out.reshape(len(z), len(s), 4)
+
+    def _nearest_vertices(self, s: Float[np.ndarray, " points"]) -> tuple[np.ndarray, ...]:
+        """Elements, on which side of them the nearest vertices are, and the ways from these."""
+        known, key = self._vertices, s.tobytes()
+        found = known.get(key)
+        if found is None:
+            element, t = self.mesh.locate(s)
+            side = (t > 0.5).astype(np.int64)
+            found = element, side, s - self.mesh.breaks[element + side]
+            if len(s) == 1 and len(known) < KEPT:
+                known[key] = found
+        return found
+
+    @cached_property
+    def _vertices(self) -> dict[bytes, tuple[np.ndarray, ...]]:
+        """What `_nearest_vertices` keeps."""
+        return {}
 
     def largest_curvature(self, z: Lanes, p: Parameters) -> tuple[Values, Values]:
         """max_s |κ(s)|, ends and interior extrema included, and the first arclength where it is."""
