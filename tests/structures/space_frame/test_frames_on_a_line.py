@@ -95,7 +95,21 @@ def matrix_of(frame, state):
 @pytest.mark.parametrize(("options", "legs"), BUCKLED)
 def test_solves_and_margins_leave_out_the_orbit(options, legs):
     """Against dense algebra with a border that holds the component along the orbit."""
-    frame, state = buckled(options, legs)
+    check_across_orbit(*buckled(options, legs))
+
+
+def test_unstable_orbits_have_margins_and_solves_across_them_too():
+    """The second orbit of a column, of index 2."""
+    frame = column(elements=3)
+    found = em.find_equilibria(frame, {"P": 25.0}, within=[frame.max_curvature <= 40.0], starts=60)
+    second = next(state for state in found if state.index == 2)
+    assert frame.along_orbits(second.z[None], second.p[None]).any()
+    assert second.margin < -1.0
+    check_across_orbit(frame, second)
+
+
+def check_across_orbit(frame, state):
+    """Inertia and solves with some shifts, beside the margin, against dense ones."""
     n, z, p = frame.unknowns, state.z[None], state.p[None]
     full, way = matrix_of(frame, state), frame.along_orbits(z, p)[0]
     assert np.abs(full @ way).max() < 1e-7 * np.abs(full).max()
