@@ -31,6 +31,7 @@ from equimorph.equilibria.limit_load import (
 from equimorph.equilibria.load_cycles import LoadCycle as LoadCycle, load_cycle as load_cycle
 from equimorph.equilibria.paths import lift_legs as lift_legs
 from equimorph.equilibria.random_search import distinct as distinct
+from equimorph.equilibria.rays import Ray as Ray, least_room as least_room, rays_of as rays_of
 from equimorph.equilibria.search import (
     Completeness as Completeness,
     FoundStates as FoundStates,
@@ -47,9 +48,8 @@ from equimorph.equilibria.transitions import (
     transition_network as transition_network,
 )
 from equimorph.equilibria.worst_cases import (
-    Corner as Corner,
-    corners_of as corners_of,
     stable_over as stable_over,
     worst_named as worst_named,
+    worst_on_lattice as worst_on_lattice,
     worst_over as worst_over,
 )

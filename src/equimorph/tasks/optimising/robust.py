@@ -2,13 +2,14 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Float, Lanes, Parameters, Values
-from equimorph.equilibria import Corner, corners_of, worst_over
+from equimorph.equilibria import Ray, least_room, rays_of, worst_on_lattice
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.queries.nearest import SetPoints
 from equimorph.model import Constraint, Descriptor
@@ -25,6 +26,17 @@ Branches = Float[np.ndarray, "lanes m"]
 ROOMS = (1.1, 1.02, 1.005)
 """Shares of the box around which it is stable in the first searches; values at the very edge have
 no slopes."""
+EXCHANGES = 6
+"""Searches for an optimum: what each of them overlooks in the box joins the next one."""
+FINER = 2
+"""Factor on the intervals of the lattice by which a worst case is judged."""
+NEW = 1e-3
+"""Distance in half widths from known points on the sides of the box above which one is new."""
+OTHERWHERE = 1e6
+"""Place of the branch of a point that is no corner, far from all others."""
+BEYOND = 1e-6
+"""Worst value, relative to the values over the box, and share of the way to a side, by which a
+judgement may differ."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +46,9 @@ class RobustOptimum:
     Parameters
     ----------
     status
-        "found", or "refused" with the reason in `why`.
+        "found"; "refused" with the reason in `why`; or "not converged": the worst case is that of
+        the state, but after all exchanges the box still held what the search for the state had
+        overlooked, so that others may be better.
     offsets
         The box of imperfections, by parameter.
     nominal
@@ -44,19 +58,20 @@ class RobustOptimum:
     value
         The objective there, without imperfections.
     guaranteed
-        Its worst value at the state and at the corners of the box; inside the box an objective that
-        turns there, like a square about a target, may be worse. At the edge of stability the least
-        upper bound: the limit from inside.
+        Its worst value over the box. At the edge of stability the least upper bound: the limit from
+        inside.
     at_risk
         Worst value over the box around the nominal optimum; infinite if stability is lost.
     edge
-        Corner of the box at which the robust state is just about to lose its stability, by
-        parameter; empty if there is no such corner.
+        Point on the side of the box, often a corner, at which the robust state is just about to
+        lose its stability, by parameter; empty if there is none.
+    exchanges
+        Searches for the state, each with what the one before had overlooked in the box.
     certificate
         Optimality conditions at the state.
     """
 
-    status: Literal["found", "refused"]
+    status: Literal["found", "refused", "not converged"]
     why: str
     sense: Sense
     offsets: Mapping[str, float]
@@ -67,12 +82,14 @@ class RobustOptimum:
     at_risk: float = np.nan
     edge: Mapping[str, float] | None = None
     certificate: Certificate | None = None
+    exchanges: int = 0
 
     def __repr__(self) -> str:
         """Nominal and robust values, and the price."""
         if self.status == "refused":
             return f"RobustOptimum(refused: {self.why})"
         edge = "; at the edge of stability" if self.edge else ""
+        edge += f"; not converged: {self.why}" if self.status == "not converged" else ""
         return (
             f"RobustOptimum(guaranteed {self.guaranteed:.8g} against {self.at_risk:.8g}; "
             f"price {self.price:.6g}{edge})"
@@ -111,11 +128,14 @@ def robust_optimum(
 ) -> RobustOptimum:
     """Find the stable state whose worst case over a box of imperfections is best.
 
-    The worst case is taken over the state and the corners of the box, to which it is lifted along
-    straight lines (see `worst_over`). It is infinite where stability is lost on the way, so that an
-    optimum may lie where the box touches the edge of stability. There, the fraction of the way at
-    which stability is lost is smooth, and so is the limit of the objective from inside; both
-    determine the optimum on the edge exactly.
+    The worst case is the largest over the whole box, inside and on its sides (see `worst_over`). It
+    is infinite where stability is lost on the way, so that an optimum may lie where the box touches
+    the edge of stability. There, the fraction of the way at which stability is lost is smooth, and
+    so is the limit of the objective from inside; both determine the optimum on the edge exactly.
+
+    Each optimum is judged [BlankenshipFalk1976]_: its worst case is searched for from a lattice
+    twice as fine, and the way on which stability is lost first among all that lead through the
+    sides. What is worse than the search had found joins it, and the optimum is searched for again.
 
     Parameters
     ----------
@@ -141,6 +161,10 @@ def robust_optimum(
     InputError
         As for `optimise` and `worst_over`.
 
+    References
+    ----------
+    [BlankenshipFalk1976]_
+
     Examples
     --------
     >>> import equimorph as em
@@ -155,46 +179,126 @@ def robust_optimum(
     if not nominal.found:
         return RobustOptimum("refused", nominal.why, sense, dict(offsets))
     cost = objective if sense == "min" else _negative(objective)
-    worst = worst_over(eset.structure, cost, offsets)
-    corners = corners_of(eset.structure, cost, offsets)
-    question = _Question(eset, worst, corners, tuple(within), margin)
+    question = _Question(eset, cost, dict(offsets), tuple(within), margin)
+    kept: _Judged | None = None
+    searches = 0
+    for _ in range(EXCHANGES):
+        searches += 1
+        best, refusal = _best(question)
+        if best is None and kept is None:
+            return RobustOptimum("refused", refusal, sense, dict(offsets), nominal.best)
+        if best is None:
+            break
+        judged = _judge(question, best)
+        if kept is None or kept.why or judged.worst < kept.worst:
+            kept = judged
+        elif not judged.why:
+            break
+        if judged.further is question:
+            break
+        question = judged.further
+    assert kept is not None
+    sign, end = (1.0 if sense == "min" else -1.0), kept.end
+    at_risk = question.worst(nominal.best.state)
+    return RobustOptimum(
+        "not converged" if kept.why else "found", kept.why, sense, dict(offsets), nominal.best,
+        end.state, objective(end.state), sign * kept.worst, sign * at_risk, end.edge,
+        end.certificate, searches,
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class _Question:
+    """What is asked, the lattice of the box, and points on its sides besides the corners."""
+
+    eset: EquilibriumSet
+    cost: Descriptor
+    offsets: Mapping[str, float]
+    within: tuple[Constraint, ...]
+    margin: float
+    finer: int = 1
+    further: tuple[Float[np.ndarray, " k"], ...] = ()
+
+    @cached_property
+    def worst(self) -> Descriptor:
+        """Worst case over the box."""
+        return worst_on_lattice(self.eset.structure, self.cost, self.offsets, "max", self.finer)
+
+    @cached_property
+    def rays(self) -> tuple[Ray, ...]:
+        """Ways through the sides of the box."""
+        return rays_of(self.eset.structure, self.cost, self.offsets, self.further)
+
+
+def _best(question: _Question) -> tuple["_End | None", str]:
+    """The best state, inside or where the box touches the edge of stability; or why none."""
     best, why = None, ""
     for room in ROOMS:
-        rooms = [corner.room >= room for corner in corners]
-        found = optimise(eset, worst, within=(*within, *rooms), margin=margin)
+        rooms = [ray.room >= room for ray in question.rays]
+        within = (*question.within, *rooms)
+        found = optimise(question.eset, question.worst, within=within, margin=question.margin)
         why = why or found.why
         for each in found.all:
             ends = [_inner(each), *_on_edges(question, each, room)]
             best = min([*ends, *([best] if best else [])], key=lambda one: one.worst)
         if best is not None and not best.bound:
             break
-    if best is None:
-        return RobustOptimum("refused", why, sense, dict(offsets), nominal.best)
-    sign = 1.0 if sense == "min" else -1.0
-    return RobustOptimum(
-        "found", "", sense, dict(offsets), nominal.best, best.state, objective(best.state),
-        sign * best.worst, sign * worst(nominal.best.state), best.edge, best.certificate,
-    )  # fmt: skip
+    return best, why
 
 
 @dataclass(frozen=True)
-class _Question:
-    eset: EquilibriumSet
-    worst: Descriptor
-    corners: tuple[Corner, ...]
-    within: tuple[Constraint, ...]
-    margin: float
+class _Judged:
+    """A candidate, its worst case over the box, what the search overlooked, and how to go on."""
+
+    end: "_End"
+    worst: float
+    why: str
+    further: _Question
+
+
+def _judge(question: _Question, best: "_End") -> _Judged:
+    """Search the box around a candidate again, from a finer lattice and over all its sides."""
+    finer = replace(question, finer=FINER * question.finer)
+    branches = _at_edge(finer, best.ray).branches if best.edge else finer.worst.branches
+    assert branches is not None
+    values = branches(best.state.z[None], best.state.p[None])[0][0]
+    worst = max(float(values.max()), best.worst)
+    size = float(np.abs(values[np.isfinite(values)]).max(initial=1e-300))
+    share, end = least_room(best.state, question.offsets)
+    known = [
+        np.abs(np.abs(end) - 1.0).max(),
+        *(np.abs(end - each).max() for each in question.further),
+    ]
+    beside = replace(question, further=(*question.further, end))
+    if share < 1.0 - BEYOND:
+        widths = np.array(list(question.offsets.values()))
+        text = ", ".join(
+            f"{name} {value:+.6g}"
+            for name, value in zip(question.offsets, (end * widths).tolist(), strict=True)
+        )
+        why = f"stability is lost at {share:.6g} of the way to {text}"
+        return _Judged(best, np.inf, why, beside)
+    if worst > best.worst + BEYOND * size:
+        why = f"the worst case is {worst:.8g}, not {best.worst:.8g}"
+        return _Judged(best, worst, why, finer)
+    # searches end where stability is about to be lost on a way that they do not know
+    halted = not best.edge and share < ROOMS[0] and min(known) > NEW
+    return _Judged(best, worst, "", beside if halted else question)
 
 
 @dataclass(frozen=True)
 class _End:
-    """A candidate; `bound`: whether the required room binds, and not the edge."""
+    """A candidate; `bound`: whether the required room binds, and not the edge.
+
+    ray: number of the way at whose point on the side it is about to lose its stability.
+    """
 
     state: State
     worst: float
     edge: Mapping[str, float]
     certificate: Certificate
     bound: bool
+    ray: int = -1
 
 
 def _inner(found: Optimum) -> _End:
@@ -203,10 +307,10 @@ def _inner(found: Optimum) -> _End:
 
 
 def _on_edges(question: _Question, near: Optimum, room: float) -> list[_End]:
-    """Optima at which corners of the box are critical, from one that is close to that."""
+    """Optima at which points on the sides of the box are critical, from one close to that."""
     ends = []
-    for number, corner in enumerate(question.corners):
-        if corner.room(near.state) > room + 1e-4:
+    for number, ray in enumerate(question.rays):
+        if ray.room(near.state) > room + 1e-4:
             continue
         programme = _edge_programme(question, number)
         state = near.state
@@ -214,7 +318,7 @@ def _on_edges(question: _Question, near: Optimum, room: float) -> list[_End]:
             state.z[None], state.p[None], tangent_planes(programme.setting, state.batch)
         )
         ends += [
-            _edge(programme, corner, end)
+            _edge(programme, ray, number, end)
             for end in descend(programme, start)
             if end.converged and end.expansion.g.max() <= FEASIBLE
         ]
@@ -222,35 +326,47 @@ def _on_edges(question: _Question, near: Optimum, room: float) -> list[_End]:
 
 
 def _edge_programme(question: _Question, number: int) -> Programme:
-    """Least worst case while one corner is critical: values there are limits."""
-    eset, corners = question.eset, question.corners
-    edge = corners[number]
-    rules = [corner.room >= 1.0 for corner in corners]
-    rules.append(edge.room <= 1.0)
+    """Least worst case while one point on the sides is critical: values there are limits."""
+    eset, rays = question.eset, question.rays
+    rules = [ray.room >= 1.0 for ray in rays]
+    rules.append(rays[number].room <= 1.0)
     constraints = dict.fromkeys((*eset.constraints, *question.within, *rules))
     own = (*constraints, stability(eset.structure, question.margin))
-    branches = question.worst.branches
+    return Programme.over(eset, Objective(_at_edge(question, number), 1.0), own)
+
+
+def _at_edge(question: _Question, number: int) -> Descriptor:
+    """Worst case with the limit of the value at a point on the sides, instead of the value."""
+    ray, branches = question.rays[number], question.worst.branches
+    corners = 2 ** len(question.offsets)
     assert branches is not None
 
     def each(z: Lanes, p: Parameters) -> tuple[Branches, Branches]:
         values, places = branches(z, p)
+        limit = ray.limit.function(z, p)
         values = values.copy()
-        values[:, 1 + number] = edge.limit.function(z, p)
-        return values, places
+        for other in range(corners):  # mirror images are critical together
+            lost = np.isposinf(values[:, 1 + other])
+            edge = lost & (question.rays[other].room.function(z, p) >= 1.0 - BEYOND)
+            values[edge, 1 + other] = question.rays[other].limit.function(z, p)[edge]
+        if number < corners:
+            values[:, 1 + number] = limit
+            return values, places
+        place = np.full((len(z), 1), OTHERWHERE)
+        return np.hstack([values, limit[:, None]]), np.hstack([places, place])
 
-    goal = replace(
+    return replace(
         question.worst,
         name=f"{question.worst.name} at its edge",
         function=lambda z, p: each(z, p)[0].max(axis=1),
         branches=each,
     )
-    return Programme.over(eset, Objective(goal, 1.0), own)
 
 
-def _edge(programme: Programme, corner: Corner, end: CriticalPoint) -> _End:
+def _edge(programme: Programme, ray: Ray, number: int, end: CriticalPoint) -> _End:
     state = State(programme.setting.structure, end.point.z[0], end.point.p[0])
     found = certificate(programme, end)
-    return _End(state, float(end.expansion.f.max()), corner.offsets, found, False)
+    return _End(state, float(end.expansion.f.max()), ray.offsets, found, False, number)
 
 
 def _negative(descriptor: Descriptor) -> Descriptor:
