@@ -119,3 +119,31 @@ def test_strips_between_a_fold_and_a_constraint_are_led_along(level, width, grid
     for share, roots in ((0.6, 1), (0.2, 2)):
         point = eset.over(a=edge + share * width**2, b=b).point
         assert np.bincount(point, minlength=len(b)).tolist() == [roots] * len(b)
+
+
+@pytest.mark.parametrize("grid", [(6, 6), (4, 7)])
+@pytest.mark.parametrize(
+    "slant", [-0.13, pytest.param(0.3, marks=pytest.mark.slow)], ids=["along", "across"]
+)
+def test_strips_that_get_narrower_end_at_their_own_tip(slant, grid):
+    """x² = a − slant·b with |x| ≤ w = 0.35 (b + 0.3): a strip as wide as w², with a tip at w = 0.
+
+    Each triangle that it leaves took the tip for the corner in which fold and constraint meet over
+    it: four pieces with 580 cells of a wrong sense for the first one.
+    """
+    size = em.Descriptor("size", "1", lambda z, p: np.abs(z[:, 0]) - 0.35 * (p[:, 1] + 0.3))
+    with unchecked():
+        structure = folded(f"a - ({slant})*b")
+        eset = em.equilibrium_set(structure, BOX, within=[size <= 0.0], intervals=grid)
+    assert_faithful(eset)
+    assert (eset.audit.components, eset.audit.euler_characteristic) == (1, 1)
+    b = np.linspace(-0.2, 1.1, 27)
+    inside = 0.7 * (0.35 * (b + 0.3)) ** 2
+    found = eset.over(a=slant * b + inside, b=b)
+    np.testing.assert_allclose(
+        found.states.z[np.lexsort((found.states.z[:, 0], found.point)), 0].reshape(-1, 2),
+        np.sqrt(inside)[:, None] * np.array([-1.0, 1.0]),
+        atol=1e-9,
+    )
+    beyond = eset.over(a=slant * b + 1.3 * inside / 0.7, b=b)
+    assert len(beyond.states.z) == 0

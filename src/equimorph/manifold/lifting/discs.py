@@ -4,10 +4,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from equimorph.arrays import Bool, Int, Items, Pairs, Triples
+from equimorph.arrays import Bool, Float, Int, Items, Pairs, Triples
 from equimorph.manifold.geometry.exact_points import pin
 from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.setting import embed
+from equimorph.manifold.geometry.simplices import shares_in
 from equimorph.manifold.geometry.topology import flags_of, keys_of, rows_of
 from equimorph.manifold.lifting.crossing_branches import lonely
 from equimorph.manifold.lifting.crossing_discs import (
@@ -36,6 +37,9 @@ from equimorph.manifold.lifting.polygon_cuts import (
     planes,
     triangulate,
 )
+
+ON_SIDE = 1e-9
+"""Barycentric coordinate within which a corner lies on a side of its grid triangle."""
 
 
 @dataclass(frozen=True)
@@ -294,11 +298,27 @@ def _pin(pairing: Pairing, pairs: list[Group], kinds: list[int]) -> list[int | N
         ends = [pairs[k].points for k in own]
         span = planes(pairing, [pairs[k].triangle for k in own])
         pinned = pin(pairing.setting, pairing.points, ends, kind, span)
-        good = pinned.found & pairing.mesh.covers(pinned.p[:, pairing.setting.free])
+        good = pinned.found & _are_inside(pairing, [pairs[k].triangle for k in own], kind, pinned.p)
         lows = pairing.points.index[np.array(ends)].min(axis=1)
         for lane, low in zip(np.flatnonzero(good).tolist(), lows[good].tolist(), strict=True):
             out[own[lane]] = pairing.points.add(pinned.z[lane], pinned.p[lane], low, kind)
     return out
+
+
+def _are_inside(
+    pairing: Pairing, triangles: list[int], kind: int, p: Float[np.ndarray, "n P"]
+) -> Bool[np.ndarray, " n"]:
+    """Which points are in the box, and, if they are corners, over their own grid triangles.
+
+    Folds and constraints may bulge beyond a side. But where a strip between them leads on to a
+    corner further away, it may pass other vertices before.
+    """
+    mesh, places = pairing.mesh, p[:, pairing.setting.free]
+    inside = mesh.covers(places)
+    if kind == VertexKind.CORNER:
+        corners = mesh.vertices[mesh.triangles[triangles]]
+        inside &= shares_in(corners, places).min(axis=1) > -ON_SIDE
+    return inside
 
 
 @dataclass(frozen=True)
