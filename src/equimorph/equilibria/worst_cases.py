@@ -34,12 +34,12 @@ def worst_over(
 ) -> Descriptor:
     """Largest value of a descriptor over a box of imperfections around a state, or the smallest.
 
-    The sheet of the state is followed along straight lines to a lattice of the box: 5 points of one
-    parameter, 3 along each of several. From where values and slopes there show a peak, it is
-    climbed, inside the box and on its sides (`BoxPeaks`). The result is the largest value found, ∞
-    where stability is lost on the way to a point of the lattice; or the smallest, and −∞. The
-    middle, the corners and the peaks are the branches of a largest value, so that `optimise` finds
-    its minima, kinks included, exactly.
+    The sheet of the state is followed along straight lines to a lattice of the box, of 3 points
+    along each axis, which is refined where slopes do not predict the differences of its values.
+    From where these show a peak, it is climbed, inside the box and on its sides (`BoxPeaks`). The
+    result is the largest value found, ∞ where stability is lost on the way to a point of the
+    lattice; or the smallest, and −∞. The middle, the corners and the peaks are the branches of a
+    largest value, so that `optimise` finds its minima, kinks included, exactly.
 
     Parameters
     ----------

@@ -164,7 +164,7 @@ def strongest_settings(
     places = np.array([[each.setting[name] for name in names] for each in sure.all])
     with style.house_style():
         ax.plot(*places.T, linestyle="none", zorder=8, mew=0.8, clip_on=False, **_SURE)
-        if robust is not None and robust.status == "found":
+        if robust is not None and robust.status != "refused":
             middle = np.array([robust.best.setting[name] for name in names])
             half = np.array([robust.offsets.get(name, 0.0) for name in names])
             low, size = middle - half, 2.0 * half

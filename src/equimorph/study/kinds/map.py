@@ -183,6 +183,7 @@ class StrongestKind(Kind[Answer]):
             f"{words} With errors {errors} it falls to {at_risk}. The robust setting "
             f"{place_of(robust.best.setting, names)} carries {guaranteed} at least, and {nominal} "
             f"without errors: its price is {html.number(robust.price)}."
+            f"{f' Not converged: {robust.why}.' if robust.why else ''}"
         )
 
     def details(self, question: Question, answer: Answer) -> list[str]:
@@ -203,7 +204,7 @@ def _table(question: Question, answer: Answer) -> str:
     _, sure, robust = answer
     marks = [str(k) for k in range(1, len(sure.all) + 1)]
     found = list(sure.all)
-    if robust is not None and robust.status == "found":
+    if robust is not None and robust.status != "refused":
         marks.append("□")
         found.append(robust.best)
     rows = [

@@ -70,7 +70,8 @@ class RobustOptimumKind(Kind[RobustOptimum]):
 
     def words(self, question: Question, answer: RobustOptimum) -> str:
         """What is guaranteed, and its price."""
-        return f"**found**. {_price_in_words(question, answer)}"
+        status = "**found**." if answer.found else f"**not converged**: {answer.why}."
+        return f"{status} {_price_in_words(question, answer)}"
 
     def details(self, question: Question, answer: RobustOptimum) -> list[str]:
         """Both optima in a table."""
@@ -106,8 +107,8 @@ def _price_in_words(question: Question, answer: RobustOptimum) -> str:
     )
     edge = ""
     if answer.edge:
-        corner = ", ".join(f"{each} {'+' if x > 0 else '−'}" for each, x in answer.edge.items())
-        edge = f" Its box touches the edge of stability at the corner {corner}."
+        at = ", ".join(f"{x:+.3g} in {each}" for each, x in answer.edge.items())
+        edge = f" Its box touches the edge of stability at an offset of {at.replace('-', '−')}."
     return (
         f"With errors {errors} {risk}. At {place_of(answer.state, question.free)} {name} is "
         f"{html.number(answer.guaranteed, 6)} in the worst case, and "

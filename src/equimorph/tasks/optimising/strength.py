@@ -91,7 +91,8 @@ class StrongestSettings:
     Parameters
     ----------
     status
-        "found", or "refused" with the reason in `why`.
+        "found"; "refused" with the reason in `why`; or "not converged": the last round of a robust
+        search found a lower load in the box than that which it had raised.
     all
         Local optima, the best first.
     offsets
@@ -108,7 +109,7 @@ class StrongestSettings:
         The best nominal setting.
     """
 
-    status: Literal["found", "refused"]
+    status: Literal["found", "refused", "not converged"]
     why: str
     all: tuple[Strongest, ...]
     offsets: Mapping[str, float]
@@ -316,15 +317,18 @@ def _robust(lmap: LimitLoadMap, sure: Strongest, offsets: Mapping[str, float]) -
             break
         # a jump passes through the box between the sampled settings
         around = np.concatenate([around, everywhere[[lowest]]])
+    gap = guaranteed - values[lowest]
+    why = f"the load in the box falls {gap:.3g} below that at its sampled settings"
+    status: Literal["found", "not converged"] = "found" if gap <= LEVEL else "not converged"
     nominal, guaranteed = float(lmap.rays(setting[None])[0]), min(guaranteed, values[lowest])
     sides = _sides(lmap, setting, size / np.linalg.norm(size))
     found = _strongest(lmap, setting, nominal, "robust", np.nan, sides)
     best = np.array(list(sure.setting.values()))
     at_risk = float(np.nan_to_num(lmap.rays(best + everywhere), nan=0.0).min())
     price = sure.value - nominal
-    return StrongestSettings(
-        "found", "", (found,), dict(offsets), float(guaranteed), price, at_risk, sure
-    )
+    told = status, "" if status == "found" else why
+    worst = float(guaranteed)
+    return StrongestSettings(*told, (found,), dict(offsets), worst, price, at_risk, sure)
 
 
 def _raise_minimum(
