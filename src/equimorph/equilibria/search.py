@@ -255,8 +255,7 @@ def search_with_graph(
 ) -> tuple[list[FoundStates], MinimaGraph]:
     """What `search_points` finds, and the graph of all states that served it.
 
-    The graph has also states beyond the constraints, as far as descents, at a pace, and lines met
-    them.
+    The graph has states beyond the constraints, too, as far as descents and lines met them.
     """
     if not structure.finds_orbits:
         check_isolated(structure, points)
