@@ -74,6 +74,7 @@ CHANGES: Mapping[str, Change] = {
     "Audit": Change(version=8),
     "LeastSnap": Change(version=2),
     "Proof": Change(version=3, removed=("status",)),  # it follows from `why` and `bounds`
+    "RobustOptimum": Change(version=2),  # older ones have no number of exchanges
     "Route": Change(version=4),  # older ones have no bottleneck, survival or relaxations
     "Schedule": Change(version=2),  # older ones have no times
     "Shapes": Change(version=2, renamed={"wanted": "targets"}),

@@ -38,8 +38,9 @@ from equimorph.manifold.lifting.polygon_cuts import (
     triangulate,
 )
 
-ON_SIDE = 1e-9
-"""Barycentric coordinate within which a corner lies on a side of its grid triangle."""
+BULGE = 0.2
+"""How far corners may lie beyond a side of their grid triangle, as a barycentric coordinate: on
+coarse grids folds and constraints bulge so far; tips of strips lie further away."""
 
 
 @dataclass(frozen=True)
@@ -308,16 +309,16 @@ def _pin(pairing: Pairing, pairs: list[Group], kinds: list[int]) -> list[int | N
 def _are_inside(
     pairing: Pairing, triangles: list[int], kind: int, p: Float[np.ndarray, "n P"]
 ) -> Bool[np.ndarray, " n"]:
-    """Which points are in the box, and, if they are corners, over their own grid triangles.
+    """Which points are in the box, and, if they are corners, over their own grid triangles or near.
 
-    Folds and constraints may bulge beyond a side. But where a strip between them leads on to a
-    corner further away, it may pass other vertices before.
+    Folds and constraints bulge beyond sides. But where a strip between them leads on to a corner
+    further away, it may pass other vertices before.
     """
     mesh, places = pairing.mesh, p[:, pairing.setting.free]
     inside = mesh.covers(places)
     if kind == VertexKind.CORNER:
         corners = mesh.vertices[mesh.triangles[triangles]]
-        inside &= shares_in(corners, places).min(axis=1) > -ON_SIDE
+        inside &= shares_in(corners, places).min(axis=1) > -BULGE
     return inside
 
 

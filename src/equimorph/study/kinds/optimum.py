@@ -107,8 +107,9 @@ def _price_in_words(question: Question, answer: RobustOptimum) -> str:
     )
     edge = ""
     if answer.edge:
-        at = ", ".join(f"{x:+.3g} in {each}" for each, x in answer.edge.items())
-        edge = f" Its box touches the edge of stability at an offset of {at.replace('-', '−')}."
+        away = {each: x * answer.offsets[each] for each, x in answer.edge.items()}
+        at = ", ".join(f"{x:+.3g} in {each}" for each, x in away.items())
+        edge = f" Its box touches the edge of stability at offsets {at.replace('-', '−')}."
     return (
         f"With errors {errors} {risk}. At {place_of(answer.state, question.free)} {name} is "
         f"{html.number(answer.guaranteed, 6)} in the worst case, and "

@@ -64,7 +64,7 @@ class RobustOptimum:
         Worst value over the box around the nominal optimum; infinite if stability is lost.
     edge
         Point on the side of the box, often a corner, at which the robust state is just about to
-        lose its stability, by parameter; empty if there is none.
+        lose its stability: offsets in half widths of the box, by parameter; empty if there is none.
     exchanges
         Searches for the state, each with what the one before had overlooked in the box.
     certificate
