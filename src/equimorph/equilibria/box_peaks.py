@@ -122,6 +122,11 @@ class BoxPeaks:
         gap = np.abs(self.lattice[None] - self.lattice[:, None]).max(axis=2)
         return np.asarray((gap < 1.5 * step) & (gap > 0.0))
 
+    @cached_property
+    def _refined(self) -> "BoxPeaks":
+        """The same with a lattice twice as fine, whose tables are kept."""
+        return replace(self, finer=2 * self.finer)
+
     def over(
         self, z: Lanes, p: Parameters
     ) -> tuple[Float[np.ndarray, "lanes m"], Float[np.ndarray, "lanes m k"]]:
@@ -135,7 +140,7 @@ class BoxPeaks:
         values, offsets = self._with_peaks(samples, value, slope)
         doubtful = np.flatnonzero(self._deviates(value, slope))
         if len(doubtful) and 2 * self.finer <= FINEST_LATTICE.get(len(self.sizes), 1):
-            better = replace(self, finer=2 * self.finer).over(z[doubtful], p[doubtful])
+            better = self._refined.over(z[doubtful], p[doubtful])
             more = max(better[0].shape[1] - values.shape[1], 0)
             values = np.pad(values, ((0, 0), (0, more)), constant_values=-np.inf)
             offsets = np.pad(offsets, ((0, 0), (0, more), (0, 0)))

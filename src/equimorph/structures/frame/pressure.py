@@ -13,7 +13,6 @@ from equimorph.arrays import Complex, Entries, Float, Int, Nodal, Scalars, Value
 from equimorph.linalg.dense import multiply
 from equimorph.linalg.sparse import SparseLayout
 from equimorph.structures.rod.pressure import (
-    BLOCK,
     EnclosedArea,
     closing,
     double_quadrature,
@@ -28,6 +27,8 @@ Along = Float[np.ndarray, "lanes along"]
 Fields = Complex[np.ndarray, "lanes points"]
 ROUND_OFF = 1e-15
 """Share of the largest entry of W below which one of E is none."""
+BLOCK = 128
+"""Matrices that are assembled together: the cost of a call is small against theirs."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -162,9 +162,6 @@ class EnclosedArea:
 Angles = Float[np.ndarray, "lanes unknowns"]
 Square = Float[np.ndarray, "unknowns unknowns"]
 
-BLOCK = 128
-"""Matrices that are assembled together: the cost of a call is small against theirs."""
-
 
 def pressed_rows(
     theta: Angles, pull: Float[np.ndarray, "lanes 1"], stiff: Square, area: EnclosedArea
