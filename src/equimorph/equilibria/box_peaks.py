@@ -83,7 +83,8 @@ class BoxPeaks:
     places, sizes
         Numbers of the parameters, and half widths of the box.
     finer
-        Factor on the number of lattice intervals.
+        Factor on the number of lattice intervals; with 0 there are only the middle and the corners,
+        and no peaks are searched for.
     """
 
     structure: Structure
@@ -102,6 +103,8 @@ class BoxPeaks:
     def lattice(self) -> Offsets:
         """Offsets in half widths: none, the corners, then the other ones."""
         k = len(self.places)
+        if self.finer == 0:
+            return np.concatenate([np.zeros((1, k)), list(product((-1.0, 1.0), repeat=k))])
         points = np.array(list(product(np.linspace(-1.0, 1.0, self.levels), repeat=k)))
         rank = np.where((points == 0.0).all(axis=1), 0, 2)
         rank[(np.abs(points) == 1.0).all(axis=1)] = 1
@@ -136,6 +139,10 @@ class BoxPeaks:
         at points of the lattice that cannot compete: neither middle nor corner, and beaten.
         """
         samples = self._samples(z, p)
+        if self.finer == 0:
+            value = samples.value.reshape(len(z), -1)
+            offsets = np.broadcast_to(self.lattice, (*value.shape, len(self.sizes)))
+            return np.where(np.isneginf(value), np.inf, value), offsets
         value, slope = self._on_lattice(samples, len(z))
         values, offsets = self._with_peaks(samples, value, slope)
         doubtful = np.flatnonzero(self._deviates(value, slope))

@@ -63,13 +63,13 @@ def worst_on_lattice(
     sense: Literal["max", "min"],
     finer: int = 1,
 ) -> Descriptor:
-    """As `worst_over`, from a lattice of `finer` times as many intervals."""
+    """As `worst_over`, from a lattice of `finer` times as many intervals; 0: of the corners."""
     sign = 1.0 if sense == "max" else -1.0
     places, widths = half_widths(structure, offsets)
     box = _WorstCase(BoxPeaks(structure, descriptor, places, widths, sign, finer))
     sizes = ", ".join(f"{name} ± {float(size)!r}" for name, size in offsets.items())
     word = "worst" if sense == "max" else "lowest"
-    name = f"{word}({descriptor.name} for {sizes})" + (f" / {finer}" if finer > 1 else "")
+    name = f"{word}({descriptor.name} for {sizes})" + (f" / {finer}" if finer != 1 else "")
     symbol = f"{word} {descriptor.symbol or descriptor.name}"
     branches = box.branches if sense == "max" else None
     unit, origin = descriptor.unit, structure.signature

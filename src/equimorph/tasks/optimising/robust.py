@@ -26,7 +26,7 @@ Branches = Float[np.ndarray, "lanes m"]
 ROOMS = (1.1, 1.02, 1.005)
 """Shares of the box around which it is stable in the first searches; values at the very edge have
 no slopes."""
-EXCHANGES = 6
+EXCHANGES = 7
 """Searches for an optimum: what each of them overlooks in the box joins the next one."""
 FINER = 2
 """Factor on the intervals of the lattice by which a worst case is judged."""
@@ -133,9 +133,10 @@ def robust_optimum(
     the edge of stability. There, the fraction of the way at which stability is lost is smooth, and
     so is the limit of the objective from inside; both determine the optimum on the edge exactly.
 
-    Each optimum is judged [BlankenshipFalk1976]_: its worst case is searched for from a lattice
-    twice as fine, and the way on which stability is lost first among all that lead through the
-    sides. What is worse than the search had found joins it, and the optimum is searched for again.
+    The first search knows the corners of the box alone. Each optimum is judged
+    [BlankenshipFalk1976]_: its worst case is searched for from a lattice twice as fine, and the way
+    on which stability is lost first among all that lead through the sides. What is worse than the
+    search had found joins it, and the optimum is searched for again.
 
     Parameters
     ----------
@@ -199,7 +200,7 @@ def robust_optimum(
         question = judged.further
     assert kept is not None
     sign, end = (1.0 if sense == "min" else -1.0), kept.end
-    at_risk = question.worst(nominal.best.state)
+    at_risk = question.judge.worst(nominal.best.state)
     return RobustOptimum(
         "not converged" if kept.why else "found", kept.why, sense, dict(offsets), nominal.best,
         end.state, objective(end.state), sign * kept.worst, sign * at_risk, end.edge,
@@ -209,20 +210,29 @@ def robust_optimum(
 
 @dataclass(frozen=True)
 class _Question:
-    """What is asked, the lattice of the box, and points on its sides besides the corners."""
+    """What is asked, the lattice of the box, and points on its sides besides the corners.
+
+    The first search knows the corners alone: its optimum, if the judgement finds nothing worse in
+    the box, is that of the whole box, whose worst case nowhere is less.
+    """
 
     eset: EquilibriumSet
     cost: Descriptor
     offsets: Mapping[str, float]
     within: tuple[Constraint, ...]
     margin: float
-    finer: int = 1
+    finer: int = 0
     further: tuple[Float[np.ndarray, " k"], ...] = ()
 
     @cached_property
     def worst(self) -> Descriptor:
         """Worst case over the box."""
         return worst_on_lattice(self.eset.structure, self.cost, self.offsets, "max", self.finer)
+
+    @cached_property
+    def judge(self) -> "_Question":
+        """The same over a finer lattice."""
+        return replace(self, finer=FINER * max(1, self.finer))
 
     @cached_property
     def rays(self) -> tuple[Ray, ...]:
@@ -258,8 +268,8 @@ class _Judged:
 
 def _judge(question: _Question, best: "_End") -> _Judged:
     """Search the box around a candidate again, from a finer lattice and over all its sides."""
-    finer = replace(question, finer=FINER * question.finer)
-    branches = _at_edge(finer, best.ray).branches if best.edge else finer.worst.branches
+    judge = question.judge
+    branches = _at_edge(judge, best.ray).branches if best.edge else judge.worst.branches
     assert branches is not None
     values = branches(best.state.z[None], best.state.p[None])[0][0]
     worst = max(float(values.max()), best.worst)
@@ -280,7 +290,7 @@ def _judge(question: _Question, best: "_End") -> _Judged:
         return _Judged(best, np.inf, why, beside)
     if worst > best.worst + BEYOND * size:
         why = f"the worst case is {worst:.8g}, not {best.worst:.8g}"
-        return _Judged(best, worst, why, finer)
+        return _Judged(best, worst, why, replace(question, finer=max(1, FINER * question.finer)))
     # searches end where stability is about to be lost on a way that they do not know
     halted = not best.edge and share < ROOMS[0] and min(known) > NEW
     return _Judged(best, worst, "", beside if halted else question)
