@@ -16,6 +16,7 @@ from equimorph.linalg.condensed_kernels import (
     work_arrays,
     write_determinant,
 )
+from equimorph.linalg.coupled_kernels import coupled_arrays, reduce_coupled, restore_coupled
 from equimorph.linalg.kernels import (
     FLAGS,
     INNER,
@@ -24,7 +25,17 @@ from equimorph.linalg.kernels import (
     solve_lanes,
     write_lanes,
 )
-from equimorph.linalg.simd import LANES, load, load4, repeat4, spread, stack2, store, work_rows
+from equimorph.linalg.simd import (
+    LANES,
+    load,
+    load4,
+    repeat4,
+    sincos,
+    spread,
+    stack2,
+    store,
+    work_rows,
+)
 
 START, SIDES = np.int64(0), np.int64(2)
 """Two right-hand sides are substituted back side by side."""
@@ -32,13 +43,14 @@ START, SIDES = np.int64(0), np.int64(2)
 
 @njit(**FLAGS)
 def solve_condensed(
-    stiffness, ends, diagonal, border, columns, rows, corner, rhs, trailing,
+    stiffness, ends, coupling, diagonal, border, columns, rows, corner, rhs, trailing, turns, pull,
     x, negative, ratio, determinant,
 ):  # fmt: skip
     """Bordered solves ``[H B C; Bᵀ T …; R … D] x = rhs`` for lanes-first arrays; see `condensed`.
 
     diagonal (lanes, nodes); border (lanes, m, nodes); columns (lanes, k, n + m) and rows alike;
-    corner (lanes, k, k); rhs (lanes, r, n + m + k); trailing T (lanes, m, m); x like rhs. At least
+    corner (lanes, k, k); rhs (lanes, r, n + m + k); trailing T (lanes, m, m); x like rhs; turns
+    (lanes, nodes) and pull (lanes) of a coupling, see `reduce_coupled`, else empty. At least
     `LANES` lanes; the last block overlaps the one before. Products aᵀH⁻¹b need forward-reduced
     columns only, in the order B, C, right-hand sides, R; just the combined right-hand sides are
     substituted back.
@@ -50,12 +62,16 @@ def solve_condensed(
     n, size, width = last - first + 1, m + k, m + k + r
     tiles = tiles_of(m, k, r)
     lower, vertices, work, extremes = work_arrays(elements, inner, tiles)
+    coupled = coupling[0].shape[0]
+    arrays = coupled_arrays(coupled, inner, tiles)
     block, left = work_rows(nodes), work_rows(size * nodes)
     products, small = work_rows(size * tiles * TILE), work_rows(size * width)
     solution, square = work_rows(2 * nodes), np.empty((m, m))
     for begin in range(0, lanes, LANES):
         start = min(begin, lanes - LANES)
         read_lanes(diagonal, start * nodes, nodes, nodes, block, 0, 1)
+        if coupled > 0:
+            _read_turns(turns, pull, start, nodes, arrays)
         for c in range(m):
             position = (start * m + c) * nodes
             read_lanes(border, position, m * nodes, nodes, work, row_of_column(c, 0, nodes), TILE)
@@ -69,8 +85,9 @@ def solve_condensed(
             position, at = (start * r + c) * (n + m + k), row_of_column(m + k + c, first, nodes)
             read_lanes(rhs, position, r * (n + m + k), n, work, at, TILE)
         reduce_block(
-            stiffness, ends, block, m, k, r, lower, vertices, work, extremes, left, products
-        )
+            stiffness, ends, coupling, arrays, block, m, k, r, lower, vertices, work, extremes,
+            left, products,
+        )  # fmt: skip
         for lane in range(LANES):
             at = start + lane
             _set_small(columns[at], rows[at], corner[at], rhs[at], trailing[at], lane, small)
@@ -85,8 +102,9 @@ def solve_condensed(
         for c in range(0, r, 2):
             other = min(c + 1, r - 1)
             restore_pair(
-                stiffness, ends, size, width, c, other, lower, vertices, work, small, solution
-            )
+                stiffness, ends, coupling, arrays, size, width, c, other, lower, vertices, work,
+                small, solution,
+            )  # fmt: skip
             for side, column in enumerate((c, other)):
                 position = (start * r + column) * (n + m + k)
                 lane_step = r * (n + m + k)
@@ -97,17 +115,41 @@ def solve_condensed(
 
 
 @njit(**INNER)
-def reduce_block(stiffness, ends, block, m, k, r, lower, vertices, work, extremes, left, products):
+def _read_turns(turns, pull, start, nodes, arrays):
+    """Fill in cosines, sines and pull of a block of lanes."""
+    cosine, sine = arrays[0], arrays[1]
+    read_lanes(turns, start * nodes, nodes, nodes, cosine, 0, 1)
+    for i in range(nodes):
+        s, c = sincos(load(cosine, i))
+        store(sine, i, s)
+        store(cosine, i, c)
+    for lane in range(LANES):
+        arrays[2][0, lane] = pull[start + lane]
+
+
+@njit(**INNER)
+def reduce_block(
+    stiffness, ends, coupling, arrays, block, m, k, r, lower, vertices, work, extremes, left,
+    products,
+):  # fmt: skip
     """Factor H of all lanes, reduce its columns, and multiply those of the border with all."""
     elements, inner, nodes = stiffness.shape[0], stiffness.shape[1] - 2, block.shape[0]
     first, last = min(ends[0], 1), nodes - 1 - min(elements - ends[1], 1)
-    tiles = tiles_of(m, k, r)
-    start_block(block, vertices, extremes)
-    for group in range((elements + GROUP - 1) // GROUP):
-        reduce_group(stiffness, group, block, ends, tiles, lower, vertices, work, extremes)
+    tiles, coupled = tiles_of(m, k, r), coupling[0].shape[0] > 0
+    if coupled:
+        reduce_coupled(stiffness, ends, coupling, arrays, block, tiles, work, extremes)
+    else:
+        start_block(block, vertices, extremes)
+        for group in range((elements + GROUP - 1) // GROUP):
+            reduce_group(stiffness, group, block, ends, tiles, lower, vertices, work, extremes)
     for a in range(m + k):
         column = row_of_column(a if a < m else r + k + a, 0, nodes)
-        _weigh(lower, vertices, inner, work, column, left, a * nodes, last)
+        if coupled:
+            for i in range(first, last + 1):
+                weighed = load(work, column + i * TILE) * load(arrays[3], i)
+                store(left, a * nodes + i, weighed)
+        else:
+            _weigh(lower, vertices, inner, work, column, left, a * nodes, last)
         _products(left, a * nodes, work, nodes, tiles, first, last, products, a)
 
 
@@ -118,10 +160,16 @@ def tiles_of(m, k, r):
 
 
 @njit(**INNER)
-def restore_pair(stiffness, ends, size, width, c, other, lower, vertices, work, small, solution):
+def restore_pair(
+    stiffness, ends, coupling, arrays, size, width, c, other, lower, vertices, work, small, solution
+):
     """Substitute two right-hand sides back, side by side, with the border's part solved."""
     elements, inner = stiffness.shape[0], stiffness.shape[1] - 2
     nodes = elements * (inner + 1) + 1
+    if coupling[0].shape[0] > 0:
+        _combine(work, nodes, 0, nodes, size, width, c, other, small, solution)
+        restore_coupled(ends, coupling, arrays, solution)
+        return
     for e in range(elements, -1, -1):
         node = e * (inner + 1)
         stop = min(node + inner, nodes - 1) + 1

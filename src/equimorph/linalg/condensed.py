@@ -24,6 +24,62 @@ REFINED = 1e-8
 
 
 @dataclass(frozen=True, eq=False)
+class Coupling:
+    """Work of all nodes of a chain on each other, through two sums along the chain.
+
+    H has ``pull (W_ij sin(θ_i − θ_j) + m_i m_j Re(q exp(i(θ_i + θ_j))))`` beside its elements and
+    diagonal, with ``W_ij = ½ sign(e − f) m_i m_j`` between elements e and f.
+
+    Parameters
+    ----------
+    inside
+        W within each element; antisymmetric.
+    weights
+        m of the nodes of every element, which are added up where elements meet.
+    closed
+        Real and imaginary part of q.
+    """
+
+    inside: Float[np.ndarray, "elements order order"]
+    weights: Float[np.ndarray, "elements order"]
+    closed: Float[np.ndarray, "2"]
+
+    @property
+    def tables(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """What kernels read."""
+        return self.inside, self.weights, self.closed
+
+    @cached_property
+    def _assembled(self) -> tuple[Float[np.ndarray, "nodes nodes"], Float[np.ndarray, " nodes"]]:
+        """W and m of all nodes."""
+        elements, order = self.weights.shape
+        at = (np.arange(elements)[:, None] * (order - 1) + np.arange(order)).ravel()
+        sides = np.sign(np.arange(elements)[:, None] - np.arange(elements))
+        work = 0.5 * sides[:, None, :, None] * self.weights[:, :, None, None] * self.weights
+        work[range(elements), :, range(elements)] = self.inside
+        whole, m = np.zeros((at[-1] + 1,) * 2), np.zeros(at[-1] + 1)
+        np.add.at(whole, (at[:, None], at), work.reshape(len(at), -1))
+        np.add.at(m, at, self.weights.ravel())
+        return whole, m
+
+    def matrix(
+        self, turns: Float[np.ndarray, "lanes nodes"], pull: Values
+    ) -> Float[np.ndarray, "lanes nodes nodes"]:
+        """Return this part of H in full."""
+        whole, m = self._assembled
+        unit = np.cos(turns) + 1j * np.sin(turns)
+        coupled = whole * (unit[:, :, None] * unit.conj()[:, None]).imag
+        arm, q = m * unit, complex(*self.closed)
+        coupled += (q * arm[:, :, None] * arm[:, None]).real
+        return np.asarray(pull[:, None, None] * coupled)
+
+
+UNCOUPLED = Coupling(np.zeros((0, 0, 0)), np.zeros((0, 0)), np.zeros(2))
+Bent = tuple[Float[np.ndarray, "lanes turned"], Values]
+"""Angles θ of all nodes, and pulls, for a coupling; of no nodes without one."""
+
+
+@dataclass(frozen=True, eq=False)
 class CondensedLayout:
     """Saddle-point matrices ``[H B; Bᵀ T]`` of chained elements, many lanes at a time.
 
@@ -38,10 +94,13 @@ class CondensedLayout:
     ends
         First (0 or 1) and last (elements − 1 or elements) vertex that is an unknown; an end vertex
         left out is prescribed.
+    coupling
+        What couples all nodes, by angles and a pull of each lane.
     """
 
     stiffness: Float[np.ndarray, "elements order order"]
     ends: Int[np.ndarray, "2"]
+    coupling: Coupling = UNCOUPLED
 
     @cached_property
     def nodes(self) -> int:
@@ -69,6 +128,7 @@ class CondensedLayout:
         diagonal: Float[np.ndarray, "lanes nodes"],
         border: Float[np.ndarray, "lanes m nodes"],
         trailing: Float[np.ndarray, "lanes m m"] | None = None,
+        bent: Bent | None = None,
     ) -> Float[np.ndarray, "lanes size size"]:
         """Return the saddle-point matrices in full."""
         lanes, m = border.shape[:2]
@@ -82,6 +142,8 @@ class CondensedLayout:
         full[:, :n, n:] = border[:, :, inner].transpose(0, 2, 1)
         if trailing is not None:
             full[:, n:, n:] = trailing
+        if bent is not None and len(self.coupling.weights):
+            full[:, :n, :n] += self.coupling.matrix(*bent)[:, inner, inner]
         return full
 
     def solve(
@@ -94,6 +156,7 @@ class CondensedLayout:
         rhs: Float[np.ndarray, "lanes sides bordered"],
         *,
         trailing: Float[np.ndarray, "lanes m m"] | None = None,
+        bent: Bent | None = None,
     ) -> BorderedSolution:
         """Solve ``[A Cᵀ; R D] x = rhs`` with ``A = [H B; Bᵀ T]``, and count A's inertia.
 
@@ -104,7 +167,10 @@ class CondensedLayout:
         """
         if trailing is None:
             trailing = np.zeros((len(diagonal), border.shape[1], border.shape[1]))
-        given = (diagonal, border, columns, rows, corner, rhs, trailing)
+        turns, pull = (
+            (np.empty((len(diagonal), 0)), np.empty(len(diagonal))) if bent is None else bent
+        )
+        given = (diagonal, border, columns, rows, corner, rhs, trailing, turns, pull)
         self._check(*given)
         arrays = [np.ascontiguousarray(a) for a in given]
         x, negative, ratio, determinant = self._solve(*arrays)
@@ -116,7 +182,8 @@ class CondensedLayout:
             pivoted[doubtful] = True
             pivoted[refined[good]] = False
             full = [a[pivoted] for a in arrays]
-            again = solve_bordered(self.dense(full[0], full[1], full[6]), *full[2:6])
+            matrices = self.dense(full[0], full[1], full[6], (full[7], full[8]))
+            again = solve_bordered(matrices, *full[2:6])
             x[pivoted], negative[pivoted] = again.x, again.negative
             determinant[pivoted] = again.determinant
         clear_overflows(determinant)
@@ -128,9 +195,11 @@ class CondensedLayout:
         size = self.unknown.stop - self.unknown.start + m
         sides = arrays[5].shape[1]
         nodes, columns, corner = self.nodes, (lanes, k, size), (lanes, k, k)
-        ends = (corner, (lanes, sides, size + k), (lanes, m, m))
+        bent = (lanes, nodes if len(self.coupling.weights) else 0), (lanes,)
+        ends = (corner, (lanes, sides, size + k), (lanes, m, m), *bent)
         shapes = ((lanes, nodes), (lanes, m, nodes), columns, columns, *ends)
-        names = ("diagonal", "border", "columns", "rows", "corner", "rhs", "trailing")
+        names = ["diagonal", "border", "columns", "rows", "corner", "rhs", "trailing"]
+        names += ["turns", "pull"]
         for name, shape, array in zip(names, shapes, arrays, strict=True):
             if array.shape != shape:
                 raise InputError(f"`{name}` must have shape {shape}; got {array.shape}.")
@@ -147,20 +216,21 @@ class CondensedLayout:
         lanes = len(arrays[0])
         x, ratio, determinant = np.empty(arrays[5].shape), np.empty(lanes), np.empty((lanes, 2))
         outputs = x, np.empty(lanes, dtype=np.int64), ratio, determinant
-        over_lanes(solve_condensed, (self.stiffness, self.ends), arrays, outputs)
+        shared = self.stiffness, self.ends, self.coupling.tables
+        over_lanes(solve_condensed, shared, arrays, outputs)
         return outputs
 
     def _refine(
         self, arrays: list[np.ndarray], x: Float[np.ndarray, "lanes sides bordered"]
     ) -> tuple[Float[np.ndarray, "lanes sides bordered"], Flags]:
         """Solutions after a step of iterative refinement, and which of them can be trusted."""
-        diagonal, border, columns, rows, corner, rhs, trailing = arrays
+        diagonal, border, columns, rows, corner, rhs, trailing, *bent = arrays
         n = columns.shape[2]
         full = np.zeros((len(x), rhs.shape[2], rhs.shape[2]))
-        full[:, :n, :n] = self.dense(diagonal, border, trailing)
+        full[:, :n, :n] = self.dense(diagonal, border, trailing, (bent[0], bent[1]))
         full[:, :n, n:], full[:, n:, :n] = columns.transpose(0, 2, 1), rows
         full[:, n:, n:] = corner
         defect = np.ascontiguousarray(rhs - np.einsum("lij,lsj->lsi", full, x))
-        change = self._solve(*arrays[:5], defect, trailing)[0]
+        change = self._solve(*arrays[:5], defect, trailing, *bent)[0]
         size, largest = (np.abs(a).max(axis=(1, 2), initial=0.0) for a in (change, x))
         return x + change, np.asarray(size <= REFINED * largest)

@@ -15,8 +15,8 @@ from equimorph.arrays import (
     Values,
 )
 from equimorph.linalg import BorderedSolution, CondensedLayout, no_border
+from equimorph.linalg.condensed import UNCOUPLED
 from equimorph.linalg.lanes import over_lanes
-from equimorph.linalg.sparse import SparseLayout
 from equimorph.structures.contract import Symmetry
 from equimorph.structures.equations import (
     Advance,
@@ -32,8 +32,7 @@ from equimorph.structures.rod.general_step_kernels import advance_lanes
 from equimorph.structures.rod.mechanics import LARGEST_TAIL
 from equimorph.structures.rod.model import RodModel, pack_tables
 from equimorph.structures.rod.planar_energy import PlanarEnergy
-from equimorph.structures.rod.pressure import EnclosedArea
-from equimorph.structures.rod.pressure_kernels import press_entries, press_lanes
+from equimorph.structures.rod.pressure import EnclosedArea, coupling
 from equimorph.structures.rod.reflections import symmetries
 
 Points = Float[np.ndarray, "lanes points"]
@@ -55,12 +54,12 @@ class GeneralMechanics(GeneralInertia):
         self.parameters = len(model.names)
         start, stop = model.held
         ends = np.array([int(start), model.mesh.elements - int(stop)])
-        self.layout = CondensedLayout(np.ascontiguousarray(model.stiffness), ends)
+        pressed = model.pressure.any()
+        coupled = coupling(model.mesh, model.closing) if pressed else UNCOUPLED
+        self.layout = CondensedLayout(np.ascontiguousarray(model.stiffness), ends, coupled)
         self.mass = model.mesh.weights[self.unknown_nodes].copy()
         self.unknowns = len(self.mass)
-        self._area = (
-            EnclosedArea.of_rod(model.mesh, model.closing) if model.pressure.any() else None
-        )
+        self._area = EnclosedArea.of_rod(model.mesh, model.closing) if pressed else None
 
     @property
     def unknown_nodes(self) -> slice:
@@ -73,7 +72,9 @@ class GeneralMechanics(GeneralInertia):
         squared, turned = (np.ascontiguousarray(a) for a in (model.quadratic, model.turned))
         tables = parts.points, model.softness, parts.slope, parts.picks, parts.splits
         first = np.int64(self.unknown_nodes.start)
-        return self.layout.stiffness, *tables, squared, turned, first
+        pressure = np.ascontiguousarray(model.pressure)
+        pressed = self.layout.coupling.tables, pressure
+        return self.layout.stiffness, *tables, squared, turned, first, *pressed
 
     def scalars(self, z: Lanes, p: Parameters) -> Scalars:
         """Multipliers, parameters and 1."""
@@ -222,47 +223,16 @@ class GeneralMechanics(GeneralInertia):
             np.empty((lanes, m, m)),
         )
         over_lanes(linearise_lanes, self._step_data, [z, p, dp], out)
-        if self._area is not None:
-            n = self.unknowns
-            more = np.empty((lanes, n)), np.empty((lanes, n)), np.empty((lanes, n))
-            over_lanes(press_lanes, self._pressed, [z, p, dp], more)
-            places = (slice(n), slice(n), self.unknown_nodes)
-            for own, place, pressed in zip(out, places, more, strict=False):
-                own[:, place] += pressed
         return out
-
-    @cached_property
-    def _pressed(self) -> tuple[object, ...]:
-        """Tables of `press_lanes`."""
-        area, turned = self._area, np.ascontiguousarray(self.model.turned)
-        assert area is not None
-        closed = np.array([area.closed.real, area.closed.imag])
-        weights = np.ascontiguousarray(area.weights.real)
-        first = np.int64(self.unknown_nodes.start)
-        pressure = np.ascontiguousarray(self.model.pressure)
-        return np.ascontiguousarray(area.matrix), weights, closed, pressure, turned, first
-
-    def _velocity(self, v_z: Lanes, v_p: Parameters) -> tuple[Nodal, Float[np.ndarray, "lanes 1"]]:
-        """Change of the nodal angles and of the pressure along a direction."""
-        y = self.scalars(v_z, v_p)
-        y[:, -1] = 0.0
-        return self._angles(v_z, y), self._pressure(y)[:, None]
 
     def second_derivative(self, z: Lanes, p: Parameters, v: Direction, w: Direction) -> Lanes:
         """D²F[v, w]."""
         arrays = self.check_widths((z, p), v, w)
         out = np.empty_like(arrays[0])
-        _, points, softness, _, picks, splits, _, turned, first = self._step_data
+        _, points, softness, _, picks, splits, _, turned, first, *pressed = self._step_data
         sizes = np.int64(self.mesh.elements), np.int64(self.constraints), first
-        shared = (points, softness, picks, splits, turned, *sizes)
+        shared = (points, softness, picks, splits, turned, *sizes, *pressed)
         over_lanes(second_lanes, shared, arrays, [out])
-        if self._area is not None:
-            theta, pull = self.nodal_angles(z, p), self._pressure(self.scalars(z, p))[:, None]
-            (v_theta, v_pull), (w_theta, w_pull) = self._velocity(*v), self._velocity(*w)
-            total = pull * self._area.second(theta, v_theta, w_theta)
-            total += v_pull * self._area.gradient_derivative(theta, w_theta)
-            total += w_pull * self._area.gradient_derivative(theta, v_theta)
-            out[:, : self.unknowns] -= total[:, self.unknown_nodes]
         return out
 
     @cached_property
@@ -284,48 +254,25 @@ class GeneralMechanics(GeneralInertia):
     def solver(
         self, parts: tuple[np.ndarray, ...], z: Lanes, p: Parameters, shift: Shift = None
     ) -> Solver:
-        """Solves with F_z − shift·mass; under pressure every angle works on every other."""
+        """Solves with F_z − shift·mass."""
         diagonal, gradients, trailing = parts
         if shift is not None:
             diagonal = diagonal - shift[:, None] * self.mesh.weights
+        bent = None
         if self._area is not None:
-            entries = self._pressed_entries(z, p, diagonal, gradients, trailing)
-            return lambda rhs, border: self._full_layout.solve(entries, border, rhs)
+            bent = self.nodal_angles(z, p), self._pressure(self.scalars(z, p))
 
         def solve(rhs: Sides, border: AnyBorder) -> BorderedSolution:
             around = no_border(len(z), self.size) if border is None else border
-            return self.layout.solve(diagonal, gradients, *around, rhs, trailing=trailing)
+            sides = diagonal, gradients, *around, rhs
+            return self.layout.solve(*sides, trailing=trailing, bent=bent)
 
         return solve
-
-    @cached_property
-    def _full_layout(self) -> SparseLayout:
-        """Pattern of F_z under pressure: every angle works on every other one."""
-        return SparseLayout(*np.tril_indices(self.size), self.size, self.constraints)
-
-    def _pressed_entries(
-        self,
-        z: Lanes,
-        p: Parameters,
-        diagonal: Nodal,
-        border: Float[np.ndarray, "lanes m nodes"],
-        trailing: Float[np.ndarray, "lanes m m"],
-    ) -> Float[np.ndarray, "lanes entries"]:
-        """Entries of F_z of a rod under pressure."""
-        inner, size = self.unknown_nodes, self.size
-        stiff = np.ascontiguousarray(self.layout.assembled[inner, inner])
-        inputs = [z, p, *(each[..., inner] for each in (diagonal, border)), trailing]
-        entries = np.empty((len(z), size * (size + 1) // 2))
-        inputs = [np.ascontiguousarray(each) for each in inputs]
-        over_lanes(press_entries, (*self._pressed, stiff), inputs, [entries])
-        return entries
 
     def advance(
         self, z: Lanes, p: Parameters, dp: Parameters, row: Lanes, corner: Values, defect: Values
     ) -> Advance:
-        """One fused kernel; rods under pressure, whose matrix is full, solve in general."""
-        if self._area is not None:
-            return super().advance(z, p, dp, row, corner, defect)
+        """One fused kernel."""
         shared = (self.layout.ends, *self._step_data)
         return self.fused_advance(advance_lanes, shared, z, p, dp, row, corner, defect)
 

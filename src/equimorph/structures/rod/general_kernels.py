@@ -6,6 +6,7 @@ multiple of eight the last block overlaps the one before.
 """
 
 from equimorph.linalg.compiled import njit
+from equimorph.linalg.coupled_kernels import coupled_arrays
 from equimorph.linalg.kernels import FLAGS, INNER, read_lanes, write_lanes
 from equimorph.linalg.simd import (
     LANES,
@@ -19,6 +20,7 @@ from equimorph.linalg.simd import (
     store,
     work_rows,
 )
+from equimorph.structures.rod.pressure_kernels import dot, press_block, press_second
 
 
 @njit(**INNER)
@@ -117,14 +119,16 @@ def _write(rows, first, n, m, constraints, target, start):
 
 @njit(**INNER)
 def assemble_block(
-    stiffness, points, softness, slope, picks, splits, quadratic, turned, first, z, p, dp, start,
-    theta, scalars, velocity, picked, own, ends, force, turn, curved, edges, closure, moved, corner,
+    stiffness, points, softness, slope, picks, splits, quadratic, turned, first, coupling, pressure,
+    z, p, dp, start, theta, scalars, velocity, picked, own, ends, force, turn, curved, edges,
+    closure, moved, corner, arrays,
 ):  # fmt: skip
     """F, F_p·dp and F_z of a block of lanes from `start` on.
 
     force, turn (nodes + m): forces and their change by dp; curved (nodes): diagonal beside the
     stiffness; edges (m · nodes): gradients of the constraints; closure, moved (m): constraints and
-    their change; corner (m · m): the trailing block. picked (2 · picks) and own (2 m) are work.
+    their change; corner (m · m): the trailing block. picked (2 · picks) and own (2 m) are work;
+    arrays: those of `coupled_arrays`, of which a rod under pressure has the first three filled.
     """
     elements, order = stiffness.shape[0], stiffness.shape[1]
     nodes, m, count = theta.shape[0], closure.shape[0], len(quadratic)
@@ -191,12 +195,17 @@ def assemble_block(
             store(corner, d * m + j, load(corner, j * m + d))
     _bend(stiffness, theta, force)
     _turn_ends(stiffness, ends, turn)
+    if coupling[0].shape[0] > 0:
+        press_block(
+            coupling, pressure, theta, scalars, velocity, ends, arrays[0], arrays[1], arrays[2],
+            force, turn, curved,
+        )  # fmt: skip
 
 
 @njit(**FLAGS)
 def linearise_lanes(
-    stiffness, points, softness, slope, picks, splits, quadratic, turned, first, z, p, dp,
-    residual, column, diagonal, border, trailing,
+    stiffness, points, softness, slope, picks, splits, quadratic, turned, first, coupling, pressure,
+    z, p, dp, residual, column, diagonal, border, trailing,
 ):  # fmt: skip
     """F, F_p·dp and the parts of F_z of every lane.
 
@@ -210,12 +219,13 @@ def linearise_lanes(
     ends, corner = work_rows(2), work_rows(m * m)
     force, turn, curved = work_rows(nodes + m), work_rows(nodes + m), work_rows(nodes)
     edges, closure, moved = work_rows(m * nodes), work_rows(m), work_rows(m)
+    arrays = coupled_arrays(coupling[0].shape[0], stiffness.shape[1] - 2, 0)
     for block in range(0, z.shape[0], LANES):
         start = min(block, z.shape[0] - LANES)
         assemble_block(
-            stiffness, points, softness, slope, picks, splits, quadratic, turned, first, z, p, dp,
-            start, theta, scalars, velocity, picked, own, ends, force, turn, curved, edges, closure,
-            moved, corner,
+            stiffness, points, softness, slope, picks, splits, quadratic, turned, first, coupling,
+            pressure, z, p, dp, start, theta, scalars, velocity, picked, own, ends, force, turn,
+            curved, edges, closure, moved, corner, arrays,
         )  # fmt: skip
         write_lanes(curved, 0, 1, diagonal, start * nodes, nodes, nodes)
         write_lanes(edges, 0, 1, border, start * m * nodes, m * nodes, m * nodes)
@@ -238,8 +248,9 @@ def _acting(points, splits, at, picked, row):
 
 @njit(**FLAGS)
 def second_lanes(
-    points, softness, picks, splits, turned, elements, m, first, z, p, v_z, v_p, w_z, w_p, out
-):
+    points, softness, picks, splits, turned, elements, m, first, coupling, pressure,
+    z, p, v_z, v_p, w_z, w_p, out,
+):  # fmt: skip
     """D²F[v, w] of every lane."""
     order, width = len(softness) // elements, points.shape[1]
     nodes, n = elements * (order - 1) + 1, z.shape[1] - m
@@ -247,14 +258,18 @@ def second_lanes(
     theta, scalars, picked = work_rows(nodes), work_rows(count), work_rows(3 * picks_each)
     v, w = work_rows(nodes), work_rows(nodes)
     force, closure, zero = work_rows(nodes + m), work_rows(m), spread(0.0)
+    cosine, sine, sums, pulls = work_rows(nodes), work_rows(nodes), work_rows(32), work_rows(3)
     for block in range(0, z.shape[0], LANES):
         start = min(block, z.shape[0] - LANES)
         read_state(z, p, start, first, n, m, 1.0, turned, theta, scalars)
         _pick(scalars, picks, picked, 0, 1)
+        store(pulls, 0, dot(pressure, scalars))
         read_state(v_z, v_p, start, first, n, m, 0.0, turned, v, scalars)
         _pick(scalars, picks, picked, picks_each, 1)
+        store(pulls, 1, dot(pressure, scalars))
         read_state(w_z, w_p, start, first, n, m, 0.0, turned, w, scalars)
         _pick(scalars, picks, picked, 2 * picks_each, 1)
+        store(pulls, 2, dot(pressure, scalars))
         force[:] = 0.0
         closure[:] = 0.0
         for e in range(elements):
@@ -283,4 +298,6 @@ def second_lanes(
                     own, across = sj * s + cj * c, sj * c - cj * s
                     mixed = across * (normal_v * dw + normal_w * dv) + own * normal_vw
                     _add(closure, j, zero - stretch * own * dv * dw - k * mixed)
+        if coupling[0].shape[0] > 0:
+            press_second(coupling, theta, v, w, pulls, cosine, sine, sums, force)
         _write(force, first, n, m, closure, out, start)

@@ -12,6 +12,7 @@ from equimorph.linalg.bordered_kernels import (
 )
 from equimorph.linalg.compiled import njit
 from equimorph.linalg.condensed_kernels import TILE, pivot_ratio, work_arrays, write_determinant
+from equimorph.linalg.coupled_kernels import coupled_arrays
 from equimorph.linalg.kernels import FLAGS, INNER, read_lanes, solve_lanes, write_lanes
 from equimorph.linalg.simd import LANES, absolute, load, spread, store, where_less, work_rows
 from equimorph.structures.rod.general_kernels import assemble_block
@@ -68,8 +69,8 @@ def _largest(force, closure, first, n, m):
 
 @njit(**FLAGS)
 def advance_lanes(
-    ends, stiffness, points, softness, slope, picks, splits, quadratic, turned, first,
-    z, p, dp, row, corner, defect,
+    ends, stiffness, points, softness, slope, picks, splits, quadratic, turned, first, coupling,
+    pressure, z, p, dp, row, corner, defect,
     dz, dt, tangent_z, tangent_t, residual, index, determinant, ratio,
 ):  # fmt: skip
     """Newton step, tangent and inertia of every lane; see `structures.contract.Advance`."""
@@ -84,6 +85,7 @@ def advance_lanes(
     force, turn, curved = work_rows(nodes + m), work_rows(nodes + m), work_rows(nodes)
     edges, closure, moved = work_rows(m * nodes), work_rows(m), work_rows(m)
     lower, vertices, work, extremes = work_arrays(elements, inner, tiles)
+    arrays = coupled_arrays(coupling[0].shape[0], inner, tiles)
     left, products = work_rows(border * nodes), work_rows(border * tiles * TILE)
     small, solution, square = (
         work_rows(border * width),
@@ -94,23 +96,26 @@ def advance_lanes(
     for block in range(0, z.shape[0], LANES):
         start = min(block, z.shape[0] - LANES)
         assemble_block(
-            stiffness, points, softness, slope, picks, splits, quadratic, turned, first, z, p, dp,
-            start, theta, scalars, velocity, picked, own, moving, force, turn, curved, edges,
-            closure, moved, trailing,
+            stiffness, points, softness, slope, picks, splits, quadratic, turned, first, coupling,
+            pressure, z, p, dp, start, theta, scalars, velocity, picked, own, moving, force, turn,
+            curved, edges, closure, moved, trailing, arrays,
         )  # fmt: skip
         store(worst, 0, _largest(force, closure, first, n, m))
         _fill_columns(m, first, n, nodes, force, turn, edges, work)
         at = row_of_column(width, first, nodes)
         read_lanes(row, start * size, size, n, work, at, TILE)
         reduce_block(
-            stiffness, ends, curved, m, COLUMNS, SIDES, lower, vertices, work, extremes, left,
-            products,
+            stiffness, ends, coupling, arrays, curved, m, COLUMNS, SIDES, lower, vertices, work,
+            extremes, left, products,
         )  # fmt: skip
         _fill_small(m, closure, moved, trailing, row, corner, defect, start, n, small)
         subtract_products(products, tiles, border, width, small)
         close_border(small, m, width, square, extremes)
         solve_lanes(small, border, width)
-        restore_pair(stiffness, ends, border, width, 0, 1, lower, vertices, work, small, solution)
+        restore_pair(
+            stiffness, ends, coupling, arrays, border, width, 0, 1, lower, vertices, work, small,
+            solution,
+        )  # fmt: skip
         for c in range(m):
             store(solution, 2 * (first + n + c), load(small, c * width + border))
             store(solution, 2 * (first + n + c) + 1, load(small, c * width + border + 1))

@@ -10,6 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from equimorph.arrays import Complex, Float, Int, Nodal, Values
+from equimorph.linalg.condensed import Coupling
 from equimorph.linalg.dense import multiply
 from equimorph.structures.rod.discretisation import Mesh
 
@@ -34,12 +35,24 @@ def double_quadrature(
     return np.asarray(out)
 
 
-def rod_quadrature(mesh: Mesh) -> Float[np.ndarray, "elements order nodes"]:
-    """W of a rod before the nodes that elements share are added up in its rows."""
+def _whole_quadrature(mesh: Mesh) -> Float[np.ndarray, "elements order elements order"]:
+    """W of a rod for the nodes of all elements."""
     at = np.arange(mesh.elements)
     sides = np.sign(at[:, None] - at).astype(float)
-    reference = mesh.reference.integral
-    whole = double_quadrature(mesh.element_weights, mesh.lengths, reference, sides)
+    return double_quadrature(mesh.element_weights, mesh.lengths, mesh.reference.integral, sides)
+
+
+def coupling(mesh: Mesh, closing: Float[np.ndarray, "2 2"]) -> Coupling:
+    """What couples the angles of a rod with a pressure of 1: −∂²V/∂θ∂θ but for the diagonal."""
+    at, whole = np.arange(mesh.elements), _whole_quadrature(mesh)
+    inside = np.ascontiguousarray(whole[at, :, at])
+    closed = np.array([closing[0, 0], -closing[0, 1]])
+    return Coupling(inside, np.ascontiguousarray(mesh.element_weights), closed)
+
+
+def rod_quadrature(mesh: Mesh) -> Float[np.ndarray, "elements order nodes"]:
+    """W of a rod before the nodes that elements share are added up in its rows."""
+    whole = _whole_quadrature(mesh)
     out = np.zeros((*whole.shape[:2], len(mesh.nodes)))
     for f, there in enumerate(mesh.element_nodes):
         out[:, :, there] += whole[:, :, f]
