@@ -150,7 +150,15 @@ def test_solves_with_a_spring_and_two_borders_are_those_of_the_whole_matrix(opti
             assert found.pivoted.mean() < 0.1
 
 
-@pytest.mark.parametrize("options", [{}, {"axial": 400.0, "shear": 150.0}])
+@pytest.mark.parametrize(
+    "options",
+    [
+        {},
+        {"axial": 400.0, "shear": 150.0},
+        # a thrust stretches the rod, and moves what the condition holds
+        {"axial": 40.0, "shear": 15.0, "loads": {"P": em.PointForce(0.5, (1.0, 0.0, 0.0))}},
+    ],
+)
 def test_steps_with_the_condition_applied_afterwards_are_those_of_the_whole_matrix(options):
     """At equilibria, whatever the row of the curve; off them they differ by first order in F.
 

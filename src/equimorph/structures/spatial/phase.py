@@ -145,6 +145,15 @@ class PinnedMechanics(SpatialMechanics):
         gradients[void, -1] = -1.0
         return gradients, values
 
+    def _drift(self, z: Lanes, p: Parameters, dp: Parameters, void: Flags, value: Values) -> Values:
+        """∂c/∂p·dp at states where c is `value`: loads stretch a rod that is soft, and with it c.
+
+        The condition is affine in loads, and no turn of a clamp about the axis changes it.
+        """
+        if not (self.model.soft and dp.any()):
+            return np.zeros(len(z))
+        return np.where(void, 0.0, self._condition(z, p + dp, void)[1] - value)
+
     @cached_property
     def _condition_tables(self) -> tuple[np.ndarray, ...]:
         return condition_tables(self.model)
@@ -195,15 +204,17 @@ class PinnedMechanics(SpatialMechanics):
         bare[:, -1] = 0.0
         own, gap = self._condition(bare, p, void)
         springs, around = self._springs(z, void)[0], self.velocity(z)
-        rate = _dot(own, around)
+        rate, drift = _dot(own, around), self._drift(bare, p, dp, void, gap)
         by = np.divide(1.0, rate, out=np.zeros(len(z)), where=rate != 0.0)
         lean = by * _dot(row, around)
         given = (
             z, np.concatenate([none, p], axis=1), np.concatenate([none, dp], axis=1),
-            row - lean[:, None] * own, corner, defect - lean * gap - row[:, -1] * z[:, -1], springs,
+            row - lean[:, None] * own, corner - lean * drift,
+            defect - lean * gap - row[:, -1] * z[:, -1], springs,
         )  # fmt: skip
         step, ratio = self.bare.fused_step(advance_lanes, self.bare.step_tables, *given)
-        for way, off in ((step.dz, gap), (step.tangent_z, 0.0)):
+        ways = (step.dz, gap + drift * step.dt), (step.tangent_z, drift * step.tangent_t)
+        for way, off in ways:
             way[:, -1] = 0.0
             np.subtract(way, (by * (_dot(own, way) + off))[:, None] * around, out=way)
         step.dz[:, -1] -= z[:, -1]
