@@ -54,6 +54,14 @@ def test_forces_are_those_of_the_enclosed_area(drawn):
         np.testing.assert_allclose(one[:, :n], other[:, :n] - part[:, inner], atol=1e-13)
 
 
+def test_the_area_is_that_of_the_formula(drawn):
+    rod, z, p, _ = drawn
+    mechanics, theta = rod.mechanics, rod.mechanics.nodal_angles(z, p)
+    pull = mechanics._pressure(mechanics.scalars(z, p))
+    expected = bare(mechanics).energy(z, p) - pull * mechanics._area.value(theta)
+    np.testing.assert_allclose(mechanics.energy(z, p), expected, rtol=1e-12, atol=1e-12)
+
+
 def test_second_derivatives_are_those_of_the_enclosed_area(drawn):
     rod, z, p, dp = drawn
     mechanics, area, n = rod.mechanics, rod.mechanics._area, rod.unknowns

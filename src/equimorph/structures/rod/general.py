@@ -27,7 +27,7 @@ from equimorph.structures.equations import (
 )
 from equimorph.structures.rod.general_fields import GeneralFields
 from equimorph.structures.rod.general_inertia import GeneralInertia
-from equimorph.structures.rod.general_kernels import linearise_lanes, second_lanes
+from equimorph.structures.rod.general_kernels import energy_lanes, linearise_lanes, second_lanes
 from equimorph.structures.rod.general_step_kernels import advance_lanes
 from equimorph.structures.rod.mechanics import LARGEST_TAIL
 from equimorph.structures.rod.model import RodModel, pack_tables
@@ -138,15 +138,10 @@ class GeneralMechanics(GeneralInertia):
 
     def energy(self, z: Lanes, p: Parameters) -> Values:
         """L without the multipliers' part."""
-        theta, y, m = self.nodal_angles(z, p), self.scalars(z, p), self.constraints
-        total = 0.5 * np.einsum("li,ij,lj->l", theta, self.layout.assembled, theta)
-        total -= np.einsum("li,ji,lj->l", theta, self.model.slope, y)
-        total += 0.5 * np.einsum("li,ij,lj->l", y, self.model.quadratic, y)
-        normal, pull = self._normal(self._turned(theta), y)
-        total += (normal - 0.5 * self.model.softness * (normal + pull) ** 2).sum(axis=1)
-        if self._area is not None:
-            total -= self._pressure(y) * self._area.value(theta)
-        return np.asarray(total - (y[:, :m] * self._gradient(theta, y)[:, :m]).sum(axis=1))
+        z, p = self.check_widths((z, p))
+        out = np.empty(len(z))
+        over_lanes(energy_lanes, self._step_data, [z, p], [out])
+        return out
 
     def _turned(self, theta: Nodal) -> tuple[Points, Points]:
         """Return sin θ and cos θ at the nodes of every element."""

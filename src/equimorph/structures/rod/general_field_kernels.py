@@ -1,4 +1,4 @@
-"""Compiled kernel of the fields of general rods, a vector of lanes at a time; at least eight lanes.
+"""Compiled kernels of the fields of general rods; at least a vector of lanes.
 
 In an element, from its left end, where θ and the moment M are superconvergent,
 ``M' = (1 − N/EA) N'`` with N as in `model.RodModel`, ``κ = (M + bending)/rigidity``, ``θ' = κ``.
@@ -51,31 +51,45 @@ def _integrate(matrix, start, length, values, at, out, row):
 
 
 @njit(**INNER)
-def _start_pressure(pressure, pressed, pole, weights, first, angles, scalars, press, moments):
+def _start_pressure(pressure, pressed, pole, weights, angles, scalars, press, moments, tangents):
     """Pressure and the way from A to its pole; what pressure adds to the left moments of elements.
 
-    pressed (elements, nodes): rows of W in `pressure.EnclosedArea` at the elements' left ends;
-    pole (2, 2): P there; first (elements, order): weights of nodes in elements.
+    pressed (elements, order): rows of W in `pressure.EnclosedArea` at the elements' left ends, of
+    their own nodes; pole (2, 2): P there; weights (elements, order) of nodes in elements; tangents
+    (2 · nodes) is work.
     """
     total = spread(0.0)
     for j in range(len(pressure)):
         total = total + spread(pressure[j]) * load(scalars, j)
-    degree = (len(weights) - 1) // len(pressed)
-    x, y = spread(0.0), spread(0.0)
-    for i in range(len(weights)):
+    (elements, order), nodes = weights.shape, angles.shape[0]
+    degree = order - 1
+    for i in range(nodes):
         s, c = sincos(load(angles, i))
-        x, y = x + spread(weights[i]) * c, y + spread(weights[i]) * s
+        store(tangents, i, c)
+        store(tangents, nodes + i, s)
+    x, y = spread(0.0), spread(0.0)
+    for e in range(elements):
+        for i in range(order):
+            at, weight = e * degree + i, spread(weights[e, i])
+            x = x + weight * load(tangents, at)
+            y = y + weight * load(tangents, nodes + at)
     # Q d, which P holds beside a half
     x_closed = spread(0.0) - spread(pole[1, 0]) * x - spread(pole[1, 1] - 0.5) * y
     y_closed = spread(pole[0, 0] - 0.5) * x + spread(pole[0, 1]) * y
-    for e in range(len(pressed)):
-        across, along = spread(0.0), spread(0.0)
-        for i in range(len(weights)):
-            s, c = sincos(load(angles, i))
+    past_x, past_y, half = spread(0.0), spread(0.0), spread(0.5)
+    for e in range(elements):
+        own_x, own_y, across, along = spread(0.0), spread(0.0), spread(0.0), spread(0.0)
+        for i in range(order):
+            c, s = load(tangents, e * degree + i), load(tangents, nodes + e * degree + i)
+            own_x, own_y = own_x + spread(weights[e, i]) * c, own_y + spread(weights[e, i]) * s
             across = across + spread(pressed[e, i]) * c
             along = along + spread(pressed[e, i]) * s
-        s, c = sincos(load(angles, e * degree))
-        closed = spread(first[e, 0]) * (x_closed * s - y_closed * c)
+        first = spread(weights[e, 0])
+        across = across + first * (past_x + half * (own_x - x))
+        along = along + first * (past_y + half * (own_y - y))
+        past_x, past_y = past_x + own_x, past_y + own_y
+        c, s = load(tangents, e * degree), load(tangents, nodes + e * degree)
+        closed = first * (x_closed * s - y_closed * c)
         store(moments, e, total * (across * c + along * s + closed))
     store(press, 0, total)
     store(press, 1, spread(pole[0, 0]) * x + spread(pole[0, 1]) * y)
@@ -162,7 +176,7 @@ def fields_lanes(
     stiffness, slope, weight, softness, along, across, tension, fine_along, fine_across,
     fine_bending, fine_tension, give, fine_softness, across_rows, along_rows, bending_rows,
     tension_rows, refine, integral, lengths,
-    pressure, pressed, pole, weights, angles, scalars, out,
+    pressure, pressed, pole, angles, scalars, out,
 ):  # fmt: skip
     """θ, κ, x, y and M of every lane at the finer nodes: out (lanes, elements · 5 · fine).
 
@@ -177,13 +191,14 @@ def fields_lanes(
     pull, theta, new = work_rows(4 * fine), work_rows(fine), work_rows(3 * fine)
     local, whole = work_rows(5 * fine), work_rows(size)
     press, moments = work_rows(3 if len(pressed) > 0 else 0), work_rows(len(pressed))
+    tangents = work_rows(2 * nodes)
     rows = (across_rows, along_rows, bending_rows, tension_rows)
     for block in range(0, angles.shape[0], LANES):
         start = min(block, angles.shape[0] - LANES)
         read_lanes(angles, start * nodes, nodes, nodes, nodal, 0, 1)
         read_lanes(scalars, start * count, count, count, y, 0, 1)
         if len(pressed) > 0:
-            _start_pressure(pressure, pressed, pole, weights, weight, nodal, y, press, moments)
+            _start_pressure(pressure, pressed, pole, weight, nodal, y, press, moments, tangents)
         x_left, y_left = spread(0.0), spread(0.0)
         for e in range(elements):
             base, length = e * (order - 1), lengths[e]
@@ -215,3 +230,73 @@ def fields_lanes(
             for i in range(5 * fine):
                 store(whole, e * 5 * fine + i, load(local, i))
         write_lanes(whole, 0, 1, out, start * size, size, size)
+
+
+@njit(**INNER)
+def _derivatives(series, x):
+    """Sum of a series of Legendre polynomials at x, with its first and second derivative."""
+    before, here, slope_before, slope, bend_before, bend = 0.0, 1.0, 0.0, 0.0, 0.0, 0.0
+    value, turn, rate = 0.0, 0.0, 0.0
+    for k in range(len(series)):
+        value, turn, rate = (
+            value + series[k] * here,
+            turn + series[k] * slope,
+            rate + series[k] * bend,
+        )
+        twice = 2.0 * k + 1.0
+        bend_before, bend = bend, bend_before + twice * slope
+        slope_before, slope = slope, slope_before + twice * here
+        before, here = here, (twice * x * here - k * before) / (k + 1.0)
+    return value, turn, rate
+
+
+@njit(**INNER)
+def _refine_peak(fields, e, top, nodes, to_legendre, steps, series):
+    """Place in [−1, 1] and size of the extremum of κ next to a node of an element."""
+    count = len(nodes)
+    for i in range(count):
+        total = 0.0
+        for j in range(count):
+            total += to_legendre[i, j] * fields[e, KAPPA, j]
+        series[i] = total
+    x, low, high = nodes[top], nodes[max(top - 1, 0)], nodes[min(top + 1, count - 1)]
+    for _ in range(steps):
+        _, turn, rate = _derivatives(series, x)
+        moved = x - turn / rate
+        if low <= moved <= high:
+            x = moved
+    found, at_node = abs(_derivatives(series, x)[0]), abs(fields[e, KAPPA, top])
+    if found >= at_node:
+        return x, found
+    return nodes[top], at_node
+
+
+@njit(**FLAGS)
+def peaks_lanes(nodes, to_legendre, breaks, lengths, near, steps, fields, value, place):
+    """Largest |κ| of every lane, and its arclength, from fields (lanes, elements, 5, fine).
+
+    Every node of the finer rule, in [−1, 1], that is a peak in its element, and not below the share
+    `near` of the largest one, is improved by Newton's method on the element's polynomial.
+    """
+    lanes, elements, _, fine = fields.shape
+    series = np.empty(fine)
+    for lane in range(lanes):
+        largest, total = 0.0, 0.0
+        for e in range(elements):
+            for i in range(fine):
+                size = abs(fields[lane, e, KAPPA, i])
+                largest, total = max(largest, size), total + size
+        value[lane], place[lane] = -1.0, 0.0
+        for e in range(elements):
+            for i in range(fine):
+                size = abs(fields[lane, e, KAPPA, i])
+                left = abs(fields[lane, e, KAPPA, i - 1]) if i > 0 else -1.0
+                right = abs(fields[lane, e, KAPPA, i + 1]) if i + 1 < fine else -1.0
+                if size < left or size <= right or size < near * largest:
+                    continue
+                x, found = _refine_peak(fields[lane], e, i, nodes, to_legendre, steps, series)
+                if found >= value[lane]:
+                    value[lane] = found
+                    place[lane] = breaks[e] + lengths[e] * 0.5 * (x + 1.0)
+        if np.isnan(total):
+            value[lane], place[lane] = np.nan, np.nan

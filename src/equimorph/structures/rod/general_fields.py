@@ -6,13 +6,13 @@ from functools import cached_property
 import numpy as np
 from numpy.polynomial import legendre
 
-from equimorph.arrays import Float, Int, Scalars, Values
+from equimorph.arrays import Float, Scalars, Values
 from equimorph.linalg.lanes import over_lanes
 from equimorph.structures.rod import general_field_kernels
 from equimorph.structures.rod.discretisation import Reference, reference_element
 from equimorph.structures.rod.general_field_kernels import KAPPA, THETA, X, Y
 from equimorph.structures.rod.model import RodModel
-from equimorph.structures.rod.pressure import EnclosedArea, rod_quadrature
+from equimorph.structures.rod.pressure import EnclosedArea, coupling
 
 Angles = Float[np.ndarray, "lanes nodes"]
 
@@ -44,7 +44,9 @@ class GeneralFields:
         spread = legendre.legvander(2.0 * self.reference.nodes - 1.0, coarse.degree)
         rows = (fine.across, fine.along, fine.bending, fine.tension)
         area = EnclosedArea.of_rod(model.mesh, model.closing)
-        pressed = rod_quadrature(model.mesh)[:, 0] if model.pressure.any() else np.zeros((0, 0))
+        pressed = coupling(model.mesh, model.closing).inside[:, 0]
+        if not model.pressure.any():
+            pressed = np.zeros((0, 0))
         return (
             model.bending_stiffness,
             model.element_slope,
@@ -66,7 +68,6 @@ class GeneralFields:
             model.pressure,
             np.ascontiguousarray(pressed),
             area.pole,
-            model.mesh.weights,
         )
 
     def everywhere(
@@ -110,34 +111,10 @@ class GeneralFields:
 
         The highest peaks of the nodal values, improved by Newton on the elements' interpolants.
         """
-        kappa = self.everywhere(angles, scalars)[:, :, KAPPA]
-        sizes = np.abs(kappa)
-        sides = np.pad(sizes, ((0, 0), (0, 0), (1, 1)), constant_values=-np.inf)
-        lower = (sizes < sides[:, :, :-2]) | (sizes <= sides[:, :, 2:])
-        low = sizes < NEAR * sizes.max(axis=(1, 2), keepdims=True)
-        lane, element, top = np.nonzero(~(lower | low))
-        x, value = self._extrema(kappa[lane, element], top)
-        order = np.lexsort((value, lane))
-        last = order[np.searchsorted(lane[order], np.arange(len(kappa)), side="right") - 1]
-        mesh = self.model.mesh
-        place = mesh.breaks[element] + mesh.lengths[element] * 0.5 * (x + 1.0)
-        return value[last], place[last]
-
-    def _extrema(
-        self, kappa: Float[np.ndarray, "some fine"], top: Int[np.ndarray, " some"]
-    ) -> tuple[Float[np.ndarray, " some"], Float[np.ndarray, " some"]]:
-        """Place in [−1, 1] and size of the extrema next to the nodes `top`."""
+        fields, mesh = self.everywhere(angles, scalars), self.model.mesh
+        value, place = np.empty((2, len(fields)))
         nodes = 2.0 * self.reference.nodes - 1.0
-        series = self.reference.to_legendre @ kappa.T
-        slope, bend = legendre.legder(series, 1), legendre.legder(series, 2)
-        x = nodes[top]
-        low, high = (nodes[np.clip(top + k, 0, len(nodes) - 1)] for k in (-1, 1))
-        for _ in range(REFINING):
-            turn, rate = (legendre.legval(x, part, tensor=False) for part in (slope, bend))
-            with np.errstate(divide="ignore", invalid="ignore"):
-                moved = x - turn / rate
-            x = np.where((moved >= low) & (moved <= high), moved, x)
-        found = np.abs(legendre.legval(x, series, tensor=False))
-        at_node = np.abs(np.take_along_axis(kappa, top[:, None], 1)[:, 0])
-        better = found >= at_node
-        return np.where(better, x, nodes[top]), np.where(better, found, at_node)
+        tables = nodes, self.reference.to_legendre, mesh.breaks, mesh.lengths, NEAR, REFINING
+        if len(fields):
+            over_lanes(general_field_kernels.peaks_lanes, tables, [fields], [value, place])
+        return value, place

@@ -20,7 +20,12 @@ from equimorph.linalg.simd import (
     store,
     work_rows,
 )
-from equimorph.structures.rod.pressure_kernels import dot, press_block, press_second
+from equimorph.structures.rod.pressure_kernels import (
+    dot,
+    enclosed_area,
+    press_block,
+    press_second,
+)
 
 
 @njit(**INNER)
@@ -301,3 +306,50 @@ def second_lanes(
         if coupling[0].shape[0] > 0:
             press_second(coupling, theta, v, w, pulls, cosine, sine, sums, force)
         _write(force, first, n, m, closure, out, start)
+
+
+@njit(**FLAGS)
+def energy_lanes(
+    stiffness, points, softness, slope, picks, splits, quadratic, turned, first, coupling, pressure,
+    z, p, energy,
+):  # fmt: skip
+    """L of every lane without the multipliers' part, which is λ·∂L/∂λ."""
+    elements, order = stiffness.shape[0], stiffness.shape[1]
+    nodes, count = elements * (order - 1) + 1, len(quadratic)
+    m, width, bends, half = count - 1 - p.shape[1], points.shape[1], slope.shape[1], spread(0.5)
+    n, zero = z.shape[1] - m, spread(0.0)
+    theta, scalars, picked = work_rows(nodes), work_rows(count), work_rows(len(picks))
+    cosine, sine, bent, sums = work_rows(nodes), work_rows(nodes), work_rows(nodes), work_rows(1)
+    for block in range(0, z.shape[0], LANES):
+        start = min(block, z.shape[0] - LANES)
+        read_state(z, p, start, first, n, m, 1.0, turned, theta, scalars)
+        _pick(scalars, picks, picked, 0, 1)
+        bent[:] = 0.0
+        _bend(stiffness, theta, bent)
+        total = zero
+        for i in range(nodes):
+            couple = _combined(slope, i * bends, bends, picked, splits[2])
+            total = total + load(theta, i) * (half * load(bent, i) - couple)
+        for e in range(elements):
+            for i in range(order):
+                point = e * order + i
+                at = point * width
+                s, c = sincos(load(theta, e * (order - 1) + i))
+                a, b, pull = _acting(points, splits, at, picked, 0)
+                normal, held, k = a * s + b * c, zero, spread(softness[point])
+                for j in range(m):
+                    sj = spread(entry(points, at + j))
+                    cj = spread(entry(points, at + splits[0] + j))
+                    held = held + load(scalars, j) * (sj * s + cj * c)
+                strain = k * (normal + pull)
+                total = total + normal - half * strain * (normal + pull)
+                total = total - (spread(1.0) - strain) * held
+        for i in range(count):
+            square = half * load(scalars, i) * _mixed(quadratic, i, scalars)
+            total = total + (zero - square if i < m else square)
+        if coupling[0].shape[0] > 0:
+            area = enclosed_area(coupling, theta, cosine, sine)
+            total = total - dot(pressure, scalars) * area
+        store(sums, 0, total)
+        for k in range(LANES):
+            energy[start + k] = sums[0, k]

@@ -108,6 +108,30 @@ def press_block(
 
 
 @njit(**INNER)
+def enclosed_area(coupling, theta, cosine, sine):
+    """V of a block of lanes: ``cos θ · W sin θ + ½ Re(q d²)``."""
+    inside, weights, closed = coupling
+    (elements, order), half = weights.shape, spread(0.5)
+    for i in range(theta.shape[0]):
+        s, c = sincos(load(theta, i))
+        store(sine, i, s)
+        store(cosine, i, c)
+    x, y, total = spread(0.0), spread(0.0), spread(0.0)
+    for e in range(elements):
+        # half of what lies before less what follows: of sums before, and of their products
+        own_x, own_y = _sums(weights, e, cosine, sine)
+        total = total + half * (own_x * y - x * own_y)
+        x, y = x + own_x, y + own_y
+        for i in range(order):
+            across = spread(0.0)
+            for j in range(order):
+                across = across + spread(inside[e, i, j]) * load(sine, e * (order - 1) + j)
+            total = total + load(cosine, e * (order - 1) + i) * across
+    re, im = _times(closed[0], closed[1], x, y)
+    return total + half * (x * re - y * im)
+
+
+@njit(**INNER)
 def _add_moved(factor, at, cosine, sine, v, w, totals):
     """Add an entry of W, or a weight, times u, u v, u w and u v w of a node; real parts first."""
     dv, dw = load(v, at), load(w, at)
