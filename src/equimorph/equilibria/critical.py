@@ -135,6 +135,17 @@ def null_border(structure: Equations, z: Lanes, p: Parameters) -> Lanes:
     return np.ascontiguousarray(b / np.linalg.norm(b, axis=1, keepdims=True))
 
 
+def null_vectors(
+    structure: Equations, z: Lanes, p: Parameters
+) -> tuple[Float[np.ndarray, "lanes unknowns"], Values]:
+    """Null vectors on folds, as displacements of unit length in the metric, and φᵀF_zz[φ, φ]."""
+    n, root = structure.unknowns, np.sqrt(structure.mass)
+    b = null_border(structure, z, p)
+    norm = np.linalg.norm(b[:, :n] * root, axis=1)
+    at = Critical(structure, z, p, np.ascontiguousarray(b * norm[:, None]))
+    return at.v[:, :n] * root, at.quadratic
+
+
 SKEW = 1e-4
 """Quadratic over cubic coefficient, a length in the metric, from which on it counts as not zero."""
 DEGENERATE = 1e-7

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
-from equimorph.arrays import CellNumbers, Cells, Flags, Float, Int, Numbers, VertexNumbers
+from equimorph.arrays import CellNumbers, Cells, Facets, Flags, Float, Int, Numbers, VertexNumbers
 from equimorph.errors import InputError
 from equimorph.manifold.complex.audit import Audit
 from equimorph.manifold.complex.base_mesh import BaseMesh
@@ -17,6 +17,7 @@ from equimorph.manifold.geometry.setting import Setting
 from equimorph.manifold.geometry.topology import facets_of
 from equimorph.manifold.lookup.exact_states import StatesOver
 from equimorph.manifold.lookup.near_crossings import NearCrossings, of_set
+from equimorph.manifold.lookup.near_cusps import cusps_near
 from equimorph.manifold.lookup.over import Sheets
 from equimorph.model import Box, Constraint, parameter_vector, position
 from equimorph.structures import States, Structure
@@ -273,7 +274,15 @@ class EquilibriumSet(Tabular):
             capped,
             self.constraints,
             self._near_crossings(),
+            cusps_near(self.setting, self.points, self.cells, self._turning_folds()),
         )
+
+    def _turning_folds(self) -> Facets:
+        """Facets of folds, which may pass cusps, off crossings."""
+        d = len(self.names)
+        facets = facets_of(self.folds if d > 1 else (), d)
+        off = (self.kinds[facets] != VertexKind.CROSSING).all(axis=1)
+        return np.asarray(facets[off])
 
     def _near_crossings(self) -> NearCrossings | None:
         """Facets along which sheets cross, if they do."""

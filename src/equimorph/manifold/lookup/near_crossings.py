@@ -40,7 +40,7 @@ from equimorph.manifold.geometry.setting import Setting, embed
 from equimorph.manifold.geometry.simplices import shares_in
 from equimorph.manifold.geometry.topology import adjacency, keys_of, rows_of
 from equimorph.manifold.lookup.cell_index import Hits
-from equimorph.structures import States
+from equimorph.structures import States, Structure
 
 Parameters = Float[np.ndarray, "_ P"]
 Series = Float[np.ndarray, "coefficients lanes"]
@@ -260,16 +260,27 @@ class NearCrossings:
     def _along(
         self, centres: Centres, p: Parameters, s: Values
     ) -> tuple[Lanes, Values, Values, Flags]:
-        """Points with amplitudes s over p, r and its slope there, and which could be found."""
-        structure, b = self.setting.structure, centres.b
-        v = Critical(structure, centres.z, centres.p, b).v
-        rows, still = b[:, None], np.zeros((len(b), 1, p.shape[1]))
-        amplitude = Plane(centres.z + s[:, None] * b, p, rows, still)
-        frame = Planes(rows, still, np.zeros((len(b), 1)), b)
-        z = centres.z + s[:, None] * v
-        found = settle(structure, z, p, None, (amplitude,), GUARDS, frame, frames=False)
-        slope = -Critical(structure, found.z, p, b).g
-        return found.z, -found.unfolding, slope, found.found
+        """See `at_amplitudes`."""
+        own = centres.z, centres.p, centres.b
+        return at_amplitudes(self.setting.structure, own, p, s)
+
+
+def at_amplitudes(
+    structure: Structure, centres: tuple[Lanes, Parameters, Lanes], p: Parameters, s: Values
+) -> tuple[Lanes, Values, Values, Flags]:
+    """Points with amplitudes s from centres over p, r and its slope, and which could be found.
+
+    centres: nearly singular points z₀, their parameters, and borders.
+    """
+    at, b = centres[0], centres[2]
+    v = Critical(structure, *centres).v
+    rows, still = b[:, None], np.zeros((len(b), 1, p.shape[1]))
+    amplitude = Plane(at + s[:, None] * b, p, rows, still)
+    frame = Planes(rows, still, np.zeros((len(b), 1)), b)
+    z = at + s[:, None] * v
+    found = settle(structure, z, p, None, (amplitude,), GUARDS, frame, frames=False)
+    slope = -Critical(structure, found.z, p, b).g
+    return found.z, -found.unfolding, slope, found.found
 
 
 def of_set(setting: Setting, points: States, cells: Cells, crossings: Facets) -> NearCrossings:

@@ -39,6 +39,7 @@ from equimorph.manifold.lookup.exact_states import (
 )
 from equimorph.manifold.lookup.kernels import balanced, guesses, one_of_each, worth_trying
 from equimorph.manifold.lookup.near_crossings import NearCrossings
+from equimorph.manifold.lookup.near_cusps import NearCusps, united
 from equimorph.manifold.lookup.rims import Rims, cells_beside, nearest_rims, ways_out
 from equimorph.model import Constraint, are_feasible
 from equimorph.structures import States, Structure
@@ -71,8 +72,8 @@ class Sheets:
         Whether vertices lie on folds, and on constraints.
     constraints
         Those that cut the set off.
-    crossings
-        Where sheets cross, if they do.
+    crossings, cusps
+        Where sheets cross, and where folds turn back, if they do.
     """
 
     points: States
@@ -84,6 +85,7 @@ class Sheets:
     capped: VertexFlags
     constraints: tuple[Constraint, ...]
     crossings: NearCrossings | None = None
+    cusps: NearCusps | None = None
 
     @property
     def structure(self) -> Structure:
@@ -140,6 +142,8 @@ class Sheets:
         if doubtful:
             parts.extend(self._search(p, Hits.concatenate(doubtful)))
         z, point, cell = parts[0] if len(parts) == 1 else in_order(parts)
+        if self.cusps is not None:
+            z, point, cell = self._beside_cusps(self.cusps, p, (z, point, cell))
         if self.crossings is not None:
             z, point, cell = self._beside_crossings(self.crossings, p, z, point, cell)
         return States(self.structure, z, p[point]), point, cell
@@ -174,6 +178,12 @@ class Sheets:
     def _are_same(self, z: Lanes, other: Lanes) -> Flags:
         n = self.structure.unknowns
         return np.asarray((z[:, :n] - other[:, :n]) ** 2 @ self.structure.mass <= SAME_SOLUTION**2)
+
+    def _beside_cusps(self, cusps: NearCusps, p: Points, found: Found) -> Found:
+        """States found over points, and those that cells next to cusps hide."""
+        z, point, cell = cusps.states(self.structure, p, p[:, self.free], self.cell_index)
+        good = self.structure.resolved(z, p[point]) & are_feasible(self.constraints, z, p[point])
+        return united(self.structure, found, (z[good], point[good], cell[good]))
 
     def _beside_crossings(
         self, crossings: NearCrossings, p: Points, z: Lanes, point: Numbers, cell: Numbers

@@ -6,7 +6,7 @@ import numpy as np
 
 from equimorph.argument_checks import check_arguments
 from equimorph.arrays import CellFlags, Float, Int, Items, ItemValues, Pairs, VertexFlags
-from equimorph.equilibria.critical import Critical, null_border
+from equimorph.equilibria.critical import null_vectors
 from equimorph.equilibria.locus import Locus, nearest
 from equimorph.equilibria.settle import lower_index
 from equimorph.errors import InputError
@@ -16,7 +16,7 @@ from equimorph.manifold.complex.excerpts import fabric_of
 from equimorph.manifold.complex.marked_complex import Fabric, FacetMark
 from equimorph.manifold.complex.vertices import Vertices
 from equimorph.manifold.geometry.points import VertexKind, on_fold
-from equimorph.manifold.geometry.setting import Setting, embed
+from equimorph.manifold.geometry.setting import embed
 from equimorph.structures import States
 from equimorph.tolerances import SAME_STATE
 
@@ -95,7 +95,8 @@ def _turning(fabric: Fabric, ends: Pairs) -> Int[np.ndarray, " m"]:
     """Edges of folds at whose ends φᵀF_zz[φ, φ] has different signs."""
     folded, at = np.unique(ends, return_inverse=True)
     at = at.reshape(ends.shape)
-    null, bend = null_vectors(fabric.setting, fabric.vertices.take(folded))
+    store = fabric.vertices
+    null, bend = null_vectors(fabric.setting.structure, store.z[folded], store.p[folded])
     sense = np.einsum("ni,ni->n", null[at[:, 0]], null[at[:, 1]])
     positive = bend >= 0.0  # zero has a sign, too: a cusp at a vertex lies on one of its two edges
     return np.flatnonzero((positive[at[:, 0]] == positive[at[:, 1]]) == (sense < 0.0))
@@ -160,18 +161,6 @@ def cusps_on_edges(fabric: Fabric, near: VertexFlags | None = None) -> tuple[Pai
 
     done, found = roots(fabric, ends[turning], FacetMark.FOLD, lowest, known[turning], value)
     return ends[turning[done]], found
-
-
-def null_vectors(
-    setting: Setting, at: Vertices
-) -> tuple[Float[np.ndarray, "n unknowns"], ItemValues]:
-    """Null vectors on folds, as displacements of unit length in the metric, and φᵀF_zz[φ, φ]."""
-    structure = setting.structure
-    n, root = structure.unknowns, np.sqrt(structure.mass)
-    b = null_border(structure, at.z, at.p)
-    norm = np.linalg.norm(b[:, :n] * root, axis=1)
-    critical = Critical(structure, at.z, at.p, np.ascontiguousarray(b * norm[:, None]))
-    return critical.v[:, :n] * root, critical.quadratic
 
 
 def sides_of_existence(at: Vertices) -> Float[np.ndarray, "n 2"]:
