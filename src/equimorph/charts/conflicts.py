@@ -19,7 +19,7 @@ TOUCHING = 1e-7
 SHARP = 10_000
 """Capacity of the longest facet: the resolution of lengths in the integer flow problem."""
 ENDLESS = 2**30
-"""Capacity of links that are never cut."""
+"""Largest capacity: more would not fit the integer flow problem."""
 
 
 @dataclass(frozen=True)
@@ -141,30 +141,27 @@ def least_cut(
     """Cells on the first one's side of the shortest cut between two groups of cells.
 
     The least cut of the dual graph, with the sizes of facets in scaled parameters as capacities.
+    Each group is one of its nodes.
     """
-    whole, count = cells.whole, len(cells.numbers)
+    whole, middle = cells.whole, ~(first | second)
     size = facet_sizes(cells)[whole.across]
-    capacity = np.maximum(1, np.round(SHARP * size / max(size.max(), 1e-300))).astype(np.int32)
-    source, sink = count, count + 1
-    ends = [
-        (np.full(first.sum(), source), np.flatnonzero(first)),
-        (np.flatnonzero(second), np.full(second.sum(), sink)),
-    ]
-    a, b = whole.links.T
-    rows = np.concatenate([a, b, *(pair[0] for pair in ends)])
-    columns = np.concatenate([b, a, *(pair[1] for pair in ends)])
-    wall = np.full(int(first.sum() + second.sum()), ENDLESS, dtype=np.int32)
-    graph = coo_array(
-        (np.concatenate([capacity, capacity, wall]), (rows, columns)), shape=(count + 2,) * 2
-    ).tocsr()
+    capacity = np.maximum(1, np.round(SHARP * size / max(size.max(), 1e-300)))
+    source, sink, count = 0, 1, 2 + int(middle.sum())
+    node = np.where(second, sink, source)
+    node[middle] = np.arange(2, count)
+    ends = node[whole.links]
+    apart = ends[:, 0] != ends[:, 1]
+    a, b = ends[apart].T
+    rows, columns = np.concatenate([a, b]), np.concatenate([b, a])
+    graph = coo_array((np.tile(capacity[apart], 2), (rows, columns)), shape=(count, count)).tocsr()
+    graph.data = np.minimum(graph.data, ENDLESS)
     graph = graph.astype(np.int32)
     left = graph - maximum_flow(graph, source, sink).flow
     left.data = np.maximum(left.data, 0)
     left.eliminate_zeros()
-    reached = breadth_first_order(left, source, return_predecessors=False)
-    side = np.zeros(count + 2, bool)
-    side[reached] = True
-    return side[:count]
+    side = np.zeros(count, bool)
+    side[breadth_first_order(left, source, return_predecessors=False)] = True
+    return side[node]
 
 
 def facet_sizes(cells: Cells) -> Float[np.ndarray, " F"]:

@@ -11,7 +11,7 @@ from equimorph.charts.atlas import Atlas
 from equimorph.charts.conflicts import conflicts_of, least_cut
 from equimorph.charts.coordinates import Coordinates, coordinates_of
 from equimorph.charts.location import Cells
-from equimorph.charts.paths import Walker, Way, straightest_path
+from equimorph.charts.paths import Ground, Walker, Way, straightest_path
 from equimorph.charts.preparation import (
     add_cusp_vertices,
     cut_along_crossings,
@@ -198,8 +198,8 @@ class _Work:
         if self.fabric.dimension != 2:
             return None
         places = cells.values / cells.coordinates.setting.scales
-        clear = Walker(cells.corners, places, alone)
-        free = Walker(cells.corners, places, np.ones_like(alone))
+        ground = Ground(cells.corners, places, cells.whole)
+        clear, free = Walker(ground, alone), Walker(ground, np.ones_like(alone))
         ways = []
         for path in _paths(cells, side):
             drawn = _snap_to_cusps(clear, free, cells, path, self.cusps)
@@ -246,7 +246,7 @@ def _start_at_cusp(
     """The path from the cusp next to its beginning on, if it sees one of its first vertices."""
     if not cusps or path[0] in cusps:
         return path
-    place, corners = clear.places, cells.corners
+    place, corners = clear.ground.places, cells.corners
     around = np.arange(len(place)) == path[0]
     for _ in range(RINGS):
         around[corners[around[corners].any(axis=1)]] = True

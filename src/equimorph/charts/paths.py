@@ -13,7 +13,7 @@ from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.complex.kept_tables import adjacency_of, places_of
 from equimorph.manifold.geometry.points import are_singular, on_fold
 from equimorph.manifold.geometry.setting import embed
-from equimorph.manifold.geometry.topology import Adjacency, adjacency, faces_of
+from equimorph.manifold.geometry.topology import Adjacency, faces_of
 from equimorph.manifold.lookup.exact_states import exact_states, root_weights
 from equimorph.structures import State, States, join_states
 
@@ -130,12 +130,13 @@ def _straighten(eset: EquilibriumSet, path: list[int]) -> Way:
     folded = are_singular(eset.kinds)
     stops = [0, *(k for k in range(1, len(path) - 1) if folded[path[k]]), len(path) - 1]
     way: Way = [path[0]]
+    ground = Ground(eset.cells, eset.coordinates, adjacency_of(eset))
     for a, b in pairwise(stops):
         run = path[a : b + 1]
         if len(run) < 2:
             continue
         around = eset.stratum[np.isin(eset.cells, run[:2]).sum(axis=1) == 2]
-        walker = Walker(eset.cells, eset.coordinates, np.isin(eset.stratum, around))
+        walker = Walker(ground, np.isin(eset.stratum, around))
         way += straightest_path(walker, walker, run)[1:]
     return way
 
@@ -170,8 +171,8 @@ def _charts_of(eset: EquilibriumSet, chart: CellNumbers, way: Way) -> Int[np.nda
 
 
 @dataclass(frozen=True, eq=False)
-class Walker:
-    """Triangles over the plane on which one can go straight on.
+class Ground:
+    """Triangles over the plane, with tables for whoever walks over them.
 
     Parameters
     ----------
@@ -179,51 +180,72 @@ class Walker:
         Vertices of the triangles.
     places
         Places of all vertices in the plane.
-    allowed
-        Triangles that may be entered.
+    whole
+        How the triangles hang together.
     """
 
     corners: Int[np.ndarray, "C 3"]
     places: Float[np.ndarray, "V 2"]
-    allowed: CellFlags
+    whole: Adjacency
 
     @cached_property
-    def _whole(self) -> Adjacency:
-        return adjacency(self.corners)
-
-    @cached_property
-    def _beyond(self) -> list[list[int]]:
-        """Triangle beyond the side opposite to each corner; −1 where there is none."""
-        whole = self._whole
+    def beyond(self) -> list[int]:
+        """Triangle beyond the side opposite to each corner, −1 where there is none, by `rows`."""
+        whole = self.whole
         beyond = np.full(self.corners.shape, -1)
         facet = whole.across[whole.manifold]
         for cell, other in (whole.links[whole.manifold].T, whole.links[whole.manifold].T[::-1]):
             corner = (whole.cell_facets[cell] == facet[:, None]).argmax(axis=1)
             beyond[cell, corner] = other
-        beyond[(beyond >= 0) & ~self.allowed[beyond]] = -1
-        found: list[list[int]] = beyond.tolist()
+        found: list[int] = beyond.ravel().tolist()
         return found
 
     @cached_property
-    def _rows(self) -> list[int]:
+    def rows(self) -> list[int]:
         """Vertices of the triangles one after the other: long lists of lists are slow to make."""
         rows: list[int] = self.corners.ravel().tolist()
         return rows
 
-    def _corners(self, cell: int) -> list[int]:
-        return self._rows[3 * cell : 3 * cell + 3]
-
     @cached_property
-    def _columns(self) -> tuple[list[float], list[float]]:
+    def columns(self) -> tuple[list[float], list[float]]:
+        """Coordinates of the vertices."""
         x, y = self.places.T
         return x.tolist(), y.tolist()
+
+
+Ray = tuple[float, float, float, float]
+"""Place where it begins, and the way ahead."""
+
+
+@dataclass(frozen=True, eq=False)
+class Walker:
+    """Goes straight on over triangles.
+
+    Parameters
+    ----------
+    ground
+        The triangles.
+    allowed
+        Those that may be entered.
+    """
+
+    ground: Ground
+    allowed: CellFlags
+
+    @cached_property
+    def _open(self) -> list[bool]:
+        found: list[bool] = self.allowed.tolist()
+        return found
+
+    def _corners(self, cell: int) -> list[int]:
+        return self.ground.rows[3 * cell : 3 * cell + 3]
 
     @cached_property
     def _stars(self) -> tuple[list[int], list[int]]:
         """Allowed triangles around vertex after vertex, and where those of each vertex begin."""
         allowed = np.flatnonzero(self.allowed)
-        vertex = self.corners[allowed].ravel()
-        begin = np.concatenate([[0], np.cumsum(np.bincount(vertex, minlength=len(self.places)))])
+        vertex, count = self.ground.corners[allowed].ravel(), len(self.ground.places)
+        begin = np.concatenate([[0], np.cumsum(np.bincount(vertex, minlength=count))])
         return np.repeat(allowed, 3)[np.argsort(vertex, kind="stable")].tolist(), begin.tolist()
 
     def _around(self, vertex: int) -> list[int]:
@@ -236,28 +258,26 @@ class Walker:
         Both ends are part of it.
         """
         way: Way = [start]
-        target = self.places[goal]
         for _ in range(LONGEST):
             here = way[-1]
             assert isinstance(here, int)
             if here == goal:
                 return way
-            leg = self._leg(here, target)
+            leg = self._leg(here, goal)
             if leg is None:
                 return None
             way += leg
         return None
 
-    def _leg(self, start: int, target: Float[np.ndarray, " 2"]) -> Way | None:
+    def _leg(self, start: int, goal: int) -> Way | None:
         """From a vertex straight on to the next vertex that is met."""
-        origin = self.places[start]
-        ahead = target - origin
-        far = float(ahead @ ahead)
-        if far == 0.0:
+        x, y = self.ground.columns
+        ray = x[start], y[start], x[goal] - x[start], y[goal] - y[start]
+        if ray[2:] == (0.0, 0.0):
             return None
         for cell in self._around(start):
             a, b = (v for v in self._corners(cell) if v != start)
-            entry = self._crossing(origin, ahead, a, b)
+            entry = self._crossing(ray, a, b)
             if entry is None:
                 continue
             crossing, along = entry
@@ -265,26 +285,21 @@ class Walker:
                 return [crossing] if along <= 1.0 + AT_VERTEX else None
             if along > 1.0 + AT_VERTEX:
                 continue
-            return self._onward((origin, ahead), cell, start, crossing)
+            return self._onward(ray, cell, start, crossing)
         return None
 
-    def _onward(
-        self,
-        ray: tuple[Float[np.ndarray, " 2"], Float[np.ndarray, " 2"]],
-        cell: int,
-        corner: int,
-        crossing: Crossing,
-    ) -> Way | None:
+    def _onward(self, ray: Ray, cell: int, corner: int, crossing: Crossing) -> Way | None:
         """Through one triangle after the other until a vertex is met."""
         way: Way = [crossing]
+        beyond, allowed = self.ground.beyond, self._open
         while len(way) < LONGEST:
             a, b, _ = crossing
-            cell = self._beyond[cell][self._corners(cell).index(corner)]
-            if cell < 0:
+            cell = beyond[3 * cell + self._corners(cell).index(corner)]
+            if cell < 0 or not allowed[cell]:
                 return None
             third = next(v for v in self._corners(cell) if v not in {a, b})
             for side, rest in ((a, b), (b, a)):
-                entry = self._crossing(*ray, side, third)
+                entry = self._crossing(ray, side, third)
                 if entry is None or entry[1] > 1.0 + AT_VERTEX:
                     continue
                 if isinstance(entry[0], int):
@@ -296,12 +311,10 @@ class Walker:
                 return None
         return None
 
-    def _crossing(
-        self, origin: Float[np.ndarray, " 2"], ahead: Float[np.ndarray, " 2"], a: int, b: int
-    ) -> tuple[int | Crossing, float] | None:
+    def _crossing(self, ray: Ray, a: int, b: int) -> tuple[int | Crossing, float] | None:
         """Where a ray crosses an edge, or which of its ends it meets; and after which share."""
-        (px, py), (dx, dy) = origin.tolist(), ahead.tolist()
-        x, y = self._columns
+        px, py, dx, dy = ray
+        x, y = self.ground.columns
         ax, ay, bx, by = x[a], y[a], x[b], y[b]
         side_a = dx * (ay - py) - dy * (ax - px)
         side_b = dx * (by - py) - dy * (bx - px)
@@ -332,10 +345,11 @@ def straightest_path(clear: Walker, free: Walker, path: list[int]) -> Way:
     length[0] = 0.0
     before = np.zeros(count, int)
     ways: dict[tuple[int, int], Way] = {}
-    places = clear.places[path]
+    places = clear.ground.places[path]
     for i in range(count):
+        apart = np.linalg.norm(places - places[i], axis=1)
         for j in range(i + 1, count):
-            far = length[i] + float(np.linalg.norm(places[j] - places[i]))
+            far = length[i] + apart[j]
             if far >= length[j]:
                 continue
             way = clear.way(path[i], path[j])

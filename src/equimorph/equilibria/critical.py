@@ -129,9 +129,11 @@ def null_border(structure: Equations, z: Lanes, p: Parameters) -> Lanes:
     """Unit vectors near the null vectors of F_z, by bordered solves that stay regular there."""
     system = structure.linear_system(z, p, np.zeros((len(z), 0, p.shape[1])))
     b = np.tile(np.cos(1.3 * np.arange(z.shape[1])) + 1.1, (len(z), 1))
+    corner, rhs = np.zeros((len(z), 1, 1)), np.zeros((len(z), 1, z.shape[1] + 1))
+    rhs[:, 0, -1] = 1.0
     for _ in range(4):
-        b = b / np.linalg.norm(b, axis=1, keepdims=True)
-        b = Critical(structure, z, p, np.ascontiguousarray(b), system).v
+        b = (b / np.linalg.norm(b, axis=1, keepdims=True))[:, None]
+        b = system.solve(rhs, (b, b, corner)).x[:, 0, :-1]
     return np.ascontiguousarray(b / np.linalg.norm(b, axis=1, keepdims=True))
 
 

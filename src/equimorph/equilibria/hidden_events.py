@@ -74,6 +74,8 @@ def _before_ends(curve: Curve, points: Points, outcome: Traces) -> Events:
     """
     last = np.flatnonzero(np.append(np.diff(points.lanes) != 0, True))
     last = last[np.isin(outcome.code[points.lanes[last]], REGULAR_ENDS)]
+    if len(last) == 0:
+        return Events.join([], curve.structure.size)
     p = curve.take(points.lanes[last]).parameters(points.t[last])
     index = curve.structure.index(np.ascontiguousarray(points.z[last]), p)
     off = index != points.index[last]
@@ -217,9 +219,12 @@ def _several(curve: Curve, start: Lanes, outcome: Traces, ended: Some) -> list[i
 
 def multiplicity(structure: Structure, z: Lanes, p: Parameters, near: Values) -> Counts:
     """Number of eigenvalues of the constrained Hessian, in the metric, within ±near of zero."""
-    nothing = np.zeros((len(z), 0, structure.size))
-    above, below = (structure.solve(z, p, nothing, shift=sign * near) for sign in (1.0, -1.0))
-    return np.asarray(above.negative - below.negative)
+    if len(z) == 0:
+        return np.zeros(0, int)
+    nothing, shift = np.zeros((2 * len(z), 0, structure.size)), np.concatenate([near, -near])
+    both = structure.solve(np.concatenate([z, z]), np.concatenate([p, p]), nothing, shift=shift)
+    above, below = np.split(both.negative, 2)
+    return np.asarray(above - below)
 
 
 def _small_eigenvalue(structure: Structure, z: Lanes, p: Parameters) -> Values:

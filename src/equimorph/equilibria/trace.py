@@ -203,8 +203,10 @@ class _Job:
         only = inside_only_steps(curve, bracket, options)
         events = Events.join([shown, *block.rare.hidden, *only], curve.metric.size)
         block.rare.hidden = []
-        again = np.unique(events.lanes[~events.found])
-        again = again[ledger.retries[again] < block.options.retries]
+        again = events.lanes[~events.found]
+        if len(again):
+            again = np.unique(again)
+            again = again[ledger.retries[again] < block.options.retries]
         if len(again):
             ledger.retries[again] += 1
             block.drop(again)

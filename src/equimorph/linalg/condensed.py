@@ -198,6 +198,8 @@ class CondensedLayout:
         bent = (lanes, nodes if len(self.coupling.weights) else 0), (lanes,)
         ends = (corner, (lanes, sides, size + k), (lanes, m, m), *bent)
         shapes = ((lanes, nodes), (lanes, m, nodes), columns, columns, *ends)
+        if tuple(array.shape for array in arrays) == shapes:
+            return
         names = ["diagonal", "border", "columns", "rows", "corner", "rhs", "trailing"]
         names += ["turns", "pull"]
         for name, shape, array in zip(names, shapes, arrays, strict=True):

@@ -4,6 +4,7 @@ See docs/decisions.md, "Unsafe pivots are refined, then replaced by pivoting".
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -20,8 +21,9 @@ Border = tuple[
 """Columns, rows and corner around a matrix."""
 
 
+@lru_cache(maxsize=64)
 def no_border(lanes: int, size: int) -> Border:
-    """Border of no columns and no rows."""
+    """Border of no columns and no rows; without any entry, so that all may share it."""
     nothing = np.zeros((lanes, 0, size))
     return nothing, nothing, np.zeros((lanes, 0, 0))
 

@@ -21,7 +21,9 @@ def no_determinants(lanes: int) -> Determinants:
 
 def clear_overflows(determinants: Determinants) -> None:
     """Write nan, in place, where a pivot was no number or beyond all of them."""
-    determinants[~np.isfinite(determinants).all(axis=1)] = np.nan, 0.0
+    finite = np.isfinite(determinants)
+    if not finite.all():
+        determinants[~finite.all(axis=1)] = np.nan, 0.0
 
 
 def in_units(
