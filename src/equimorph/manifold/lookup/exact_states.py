@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.distance import cdist
 
-from equimorph.arrays import Bool, Flags, Float, Int, Items, Lanes, Numbers, Some
+from equimorph.arrays import Bool, Flags, Float, Int, Lanes, Numbers, Some
 from equimorph.equilibria import ParameterLine, TraceOptions
 from equimorph.equilibria.trace import trace
 from equimorph.equilibria.trace_options import EventCode
@@ -80,7 +80,7 @@ NEAREST = 6
 the nearest ones. Hundreds of sheets of a chain or truss lie over one point."""
 
 Points = Float[np.ndarray, "points P"]
-Found = tuple[Float[np.ndarray, "n size"], Items, Items]
+Found = tuple[Float[np.ndarray, "_ size"], Int[np.ndarray, " _"], Int[np.ndarray, " _"]]
 """States, the points that they lie over, and their cells."""
 
 
