@@ -13,6 +13,7 @@ from equimorph.linalg.kernels import FLAGS, INNER, read_lanes, write_lanes
 from equimorph.linalg.simd import (
     LANES,
     absolute,
+    entry,
     lanes_less,
     load,
     sincos,
@@ -41,13 +42,24 @@ def _combined(table, rows, e, i, scalars):
 
 @njit(**INNER)
 def _integrate(matrix, start, length, values, at, out, row):
-    """Integral of rows from `at` on, from the left end, plus a start value, into others."""
-    count = len(matrix)
-    for i in range(count):
-        total = spread(0.0)
+    """Integral of rows from `at` on, from the left end, plus a start value, into others.
+
+    Four places at once: sums of one alone would wait for each other.
+    """
+    count, whole = len(matrix), spread(length)
+    for i in range(0, count, 4):
+        a, b, c = min(i + 1, count - 1), min(i + 2, count - 1), min(i + 3, count - 1)
+        first, second, third, fourth = spread(0.0), spread(0.0), spread(0.0), spread(0.0)
         for j in range(count):
-            total = total + spread(matrix[i, j]) * load(values, at + j)
-        store(out, row + i, start + spread(length) * total)
+            value = load(values, at + j)
+            first = first + spread(entry(matrix, i * count + j)) * value
+            second = second + spread(entry(matrix, a * count + j)) * value
+            third = third + spread(entry(matrix, b * count + j)) * value
+            fourth = fourth + spread(entry(matrix, c * count + j)) * value
+        store(out, row + i, start + whole * first)
+        store(out, row + a, start + whole * second)
+        store(out, row + b, start + whole * third)
+        store(out, row + c, start + whole * fourth)
 
 
 @njit(**INNER)
@@ -143,9 +155,11 @@ def _iterate(
     if len(press) > 0:
         _place(integral, length, corner, press, theta, new, out)
     for i in range(fine):
-        s, c = sincos(load(theta, i))
         a, b = load(pull, i), load(pull, fine + i)
-        if len(press) > 0:
+        if len(press) == 0:
+            s, c = sincos(load(theta, i))
+        else:
+            s, c = load(new, 2 * fine + i), load(new, fine + i)
             a = a + load(press, 0) * load(out, X * fine + i)
             b = b - load(press, 0) * load(out, Y * fine + i)
         normal = a * s + b * c + load(pull, 3 * fine + i)
