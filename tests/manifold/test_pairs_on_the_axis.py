@@ -5,6 +5,8 @@ import pytest
 
 import equimorph as em
 from equimorph.manifold import VertexKind
+from equimorph.manifold.lifting.seeds import is_symmetric
+from equimorph.manifold.question import setting_of
 from oracles.complexes import assert_crossings
 from oracles.kirchhoff import clamped_buckling_moment
 from oracles.spatial_rods import coaxial
@@ -121,3 +123,11 @@ def test_searches_begin_from_straight_rods_with_whole_turns():
     twists = 0.5 + 4.0 * np.pi * np.arange(-1, 2)
     straight = 0.7 * twists**2 / (8.0 * np.pi**2) + 0.5 * 6.0 * 0.17**2
     np.testing.assert_allclose(np.abs(energies[:, None] - straight).min(axis=0), 0.0, atol=1e-7)
+
+
+def test_the_turn_along_orbits_asks_for_no_more_searches(rod):
+    """It takes each state to the opposite one of its orbit; the mirror of the arch keeps some."""
+    box, fixed = em.Box(twist_A=(0.1, 0.4), P=(0.7, 0.9)), {"twist_B": 0.6}
+    assert not is_symmetric(setting_of(rod, box, fixed, ()))
+    arch, box = em.Rod(load="uniform"), em.Box(Theta=(0.5, 1.0), q=(0.0, 4.0))
+    assert is_symmetric(setting_of(arch, box, {"Delta": 0.0}, ()))

@@ -1,5 +1,6 @@
 """Equilibria: solving, lifting, events, limit loads, searching."""
 
+from equimorph.equilibria.capture import Completeness as Completeness
 from equimorph.equilibria.critical_curves import (
     CriticalCurve as CriticalCurve,
     branch_curve as branch_curve,
@@ -33,7 +34,6 @@ from equimorph.equilibria.paths import lift_legs as lift_legs
 from equimorph.equilibria.random_search import distinct as distinct
 from equimorph.equilibria.rays import Ray as Ray, least_room as least_room, rays_of as rays_of
 from equimorph.equilibria.search import (
-    Completeness as Completeness,
     FoundStates as FoundStates,
     find_equilibria as find_equilibria,
     search_points as search_points,

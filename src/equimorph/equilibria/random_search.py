@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from equimorph.arrays import Float, Int, Lanes, Numbers, Parameters, Values
+from equimorph.arrays import Float, Int, Items, Lanes, Numbers, Parameters, Values
 from equimorph.equilibria.curves import ParameterLine, growing_force, newton_homotopy
 from equimorph.equilibria.saddles import Pairs, steps_for, strongest_pushes
 from equimorph.equilibria.settle import Guards, settle
@@ -91,7 +91,8 @@ class Pools:
     """Different equilibria by group, and the reasons of failed starts.
 
     A group is one independent run at one point; all groups advance together in one batch. What the
-    discretisation does not resolve is kept apart.
+    discretisation does not resolve is kept apart. starts, arrived: groups of the random guesses of
+    runs, and of those that led to a state, known or not.
     """
 
     def __init__(
@@ -106,6 +107,7 @@ class Pools:
         self.z = np.zeros((0, ground.structure.size)) if z is None else z
         self.group = np.zeros(0, int) if group is None else group
         self.failures: list[tuple[str, Groups]] = []
+        self.starts = self.arrived = np.zeros(0, int)
         self.unresolved: list[tuple[Lanes, Groups]] = []
 
     def start(self, guesses: int) -> None:
@@ -121,9 +123,10 @@ class Pools:
         near = settle(structure, guess, p, guards=Guards(iterations=40))
         found = near.found
         self.failures.append(("Newton did not converge", group[~found]))
-        self._take(near.z[found], group[found])
+        led = self._take(near.z[found], group[found])
         again = ~found & (number < np.ceil(HOMOTOPIES * guesses))
-        self._by_homotopy(guess[again], group[again])
+        followed = self._by_homotopy(guess[again], group[again])
+        self.starts, self.arrived = group, np.concatenate([led, followed])
         self._by_deflation(np.arange(len(self.z)), NUDGE)
 
     def deflate(self, groups: Groups) -> None:
@@ -217,15 +220,16 @@ class Pools:
         force[:, :n] = strength[:, None] * random * np.sqrt(structure.mass)
         return force
 
-    def _by_homotopy(self, guess: Lanes, group: Groups) -> None:
+    def _by_homotopy(self, guess: Lanes, group: Groups) -> Items:
+        """Groups of the guesses that lead to a state."""
         if len(guess) == 0:
-            return
+            return group
         structure, p = self.ground.structure, self.ground.p[group]
         curve = newton_homotopy(structure, guess, p)
         outcome = trace(curve, guess, (), WIDE_STEPS)
         arrived = outcome.code == EventCode.ARRIVED
         self.failures.append(("the Newton homotopy did not arrive", group[~arrived]))
-        self._polish(outcome.z[arrived], group[arrived])
+        return self._polish(outcome.z[arrived], group[arrived])
 
     def _by_deflation(self, lanes: Numbers, share: float) -> None:
         """From points on the way to random guesses."""
@@ -270,13 +274,16 @@ class Pools:
         length = np.linalg.norm(direction, axis=1, keepdims=True)
         return np.asarray(direction * structure.scales * (REACH / length))
 
-    def _polish(self, z: Lanes, group: Groups) -> None:
+    def _polish(self, z: Lanes, group: Groups) -> Items:
         guards = Guards(iterations=12)
         exact = settle(self.ground.structure, z, self.ground.p[group], guards=guards)
-        self._take(exact.z[exact.found], group[exact.found])
+        return self._take(exact.z[exact.found], group[exact.found])
 
-    def _take(self, z: Lanes, group: Groups) -> None:
-        """Add what is resolved, not far outside the constraints, and new in its group."""
+    def _take(self, z: Lanes, group: Groups) -> Items:
+        """Add what is resolved, not far outside the constraints, and new in its group.
+
+        Returned are the groups of what is not new as well.
+        """
         structure = self.ground.structure
         good = structure.resolved(z, self.ground.p[group])
         beyond = ~good
@@ -295,6 +302,7 @@ class Pools:
             new = pool[kept[kept >= len(known)]]
             self.z = np.concatenate([self.z, new])
             self.group = np.concatenate([self.group, np.full(len(new), each)])
+        return group
 
 
 def distinct(structure: Structure, z: Lanes) -> Int[np.ndarray, " distinct"]:

@@ -8,123 +8,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import gammaln, xlogy
 
 from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Bool, Float, Int
+from equimorph.equilibria.capture import Completeness
 from equimorph.equilibria.gradient_flow import QUICK, Pace
 from equimorph.equilibria.legs import check_isolated
 from equimorph.equilibria.minima_graph import Argument, MinimaGraph, arguments_of, contradicts
 from equimorph.equilibria.random_search import BEYOND, UNRESOLVED, Ground, Pools, distinct
 from equimorph.model import Constraint, parameter_vector
 from equimorph.structures import States, Structure
-
-CONFIDENCE = 0.95
-"""Confidence level of the bound on the probability that one more run finds a new equilibrium."""
-REJECTED = 2.706
-"""Fall of twice the log-likelihood at the end of a one-sided interval of 95 %."""
-
-
-@dataclass(frozen=True)
-class Completeness:
-    """Which of several independent runs found which equilibrium.
-
-    An estimate, not a promise: what no run can reach is not counted.
-
-    Parameters
-    ----------
-    captured
-        Whether each run found each equilibrium; no run found those that descents and searches
-        between minima have added.
-    unresolved
-        Starts that led to states which the discretisation does not resolve, and which may obey the
-        constraints; all of them if nothing was found.
-
-    References
-    ----------
-    [Chao1987]_, [Cormack1992]_
-    """
-
-    captured: Bool[np.ndarray, "runs found"]
-    unresolved: int = 0
-
-    @property
-    def runs(self) -> int:
-        """Number of independent runs."""
-        return int(self.captured.shape[0])
-
-    @property
-    def found(self) -> int:
-        """Number of different equilibria found by all runs together, and those added to them."""
-        return int(self.captured.shape[1])
-
-    @property
-    def per_run(self) -> tuple[int, ...]:
-        """Number of equilibria found by each run."""
-        return tuple(int(count) for count in self.captured.sum(axis=1))
-
-    @property
-    def estimate(self) -> float:
-        """Chao's estimate of the number of equilibria, a lower bound if some are harder to find.
-
-        ``S + (m−1)/m · f₁(f₁−1)/(2(f₂+1))`` after m runs, with f₁ and f₂ the numbers of equilibria
-        found by exactly one and by exactly two runs.
-        """
-        times = self.captured.sum(axis=0)
-        once, twice = int((times == 1).sum()), int((times == 2).sum())
-        return self.found + (self.runs - 1) / self.runs * once * (once - 1) / (2.0 * (twice + 1.0))
-
-    @property
-    def upper(self) -> float:
-        """Number of equilibria at about 95 % confidence, if all are as easy to find as those found.
-
-        Largest number that the profile likelihood does not reject [Cormack1992]_; infinite where
-        no equilibrium was found twice, or some that are not resolved. Never below `estimate`.
-        """
-        if self.unresolved:
-            return np.inf
-        if self.found == 0:
-            return self.estimate
-        if int(self.captured.sum()) == int(self.captured.any(axis=0).sum()):
-            return np.inf
-        number = int(self.captured.any(axis=0).sum())
-        best = self._log_likelihood(number)
-        while best - self._log_likelihood(number + 1) <= 0.5 * REJECTED:
-            number += 1
-            best = max(best, self._log_likelihood(number))
-        return max(self.estimate, float(number))
-
-    def _log_likelihood(self, number: int) -> float:
-        """Of `number` equilibria, at the most likely chance of a catch, the same for all."""
-        trials, hits = self.runs * number, int(self.captured.sum())
-        seen = int(self.captured.any(axis=0).sum())
-        ways = gammaln(number + 1) - gammaln(number - seen + 1)
-        chance = hits / trials
-        return float(ways + xlogy(hits, chance) + xlogy(trials - hits, 1.0 - chance))
-
-    @property
-    def detectable(self) -> float:
-        """Chance per run from which on an equilibrium is among those found, at 95 % confidence.
-
-        One that a run finds with probability p escapes all m runs with probability (1 − p)^m.
-        """
-        return float(1.0 - (1.0 - CONFIDENCE) ** (1.0 / self.runs))
-
-    def __str__(self) -> str:
-        """One line with all numbers."""
-        runs = ", ".join(str(count) for count in self.per_run)
-        found = f"{self.found} found" + (f" (in single runs {runs})" if self.found else "")
-        if self.unresolved:
-            return (
-                f"{found}; there may be any number more, as {self.unresolved} starts led to states "
-                "that the discretisation does not resolve: refine it, or exclude them by a "
-                "constraint"
-            )
-        return (
-            f"{found}; estimated {self.estimate:.1f}, at most {self.upper:.0f} (95 %) if all are "
-            "equally easy to find"
-        )
-
 
 Points = Float[np.ndarray, "points parameters"]
 
@@ -318,6 +211,8 @@ class _Catch:
     runs: int
     failures: Mapping[str, int]
     unresolved: Float[np.ndarray, "dropped size"]
+    starts: int = 0
+    arrived: int = 0
 
     @classmethod
     def empty(
@@ -351,6 +246,8 @@ class _Catch:
                     for each, group in pools.unresolved
                 ]
             ),
+            self.starts + int(((pools.starts >= first) & (pools.starts < first + runs)).sum()),
+            self.arrived + int(((pools.arrived >= first) & (pools.arrived < first + runs)).sum()),
         )
 
     def with_states(self, z: Float[np.ndarray, "more size"]) -> "_Catch":
@@ -393,7 +290,7 @@ class _Catch:
         structure, z = self.ground.structure, self.z[self.kept]
         reasons = (UNRESOLVED,) if len(z) else (UNRESOLVED, BEYOND)
         unresolved = sum(self.failures.get(reason, 0) for reason in reasons)
-        completeness = Completeness(self.captured, unresolved)
+        completeness = Completeness(self.captured, unresolved, self.starts, self.arrived)
         dropped = self.unresolved[distinct(structure, self.unresolved)]
         p, there = (np.tile(self.ground.p, (len(each), 1)) for each in (z, dropped))
         beside = States(structure, dropped, there)

@@ -12,12 +12,13 @@ import numpy as np
 
 from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Flags, Int, Values
+from equimorph.equilibria.capture import Completeness
 from equimorph.equilibria.descents import NUDGES, descend
 from equimorph.equilibria.energy_barriers import EnergyBarrier, EnergyPath, Merge
 from equimorph.equilibria.gradient_flow import FAITHFUL, SMOOTH
 from equimorph.equilibria.minima_graph import NONE, Argument, arguments_of
 from equimorph.equilibria.saddles import Nowhere, ways_over
-from equimorph.equilibria.search import Completeness, search_with_graph
+from equimorph.equilibria.search import search_with_graph
 from equimorph.equilibria.soft_modes import metric_length
 from equimorph.errors import InputError
 from equimorph.model import Constraint, parameter_vector

@@ -324,6 +324,8 @@ class _Lifting:
             descents=found.descents,
             left_out=found.left_out,
             on_lines=found.on_lines,
+            starts=found.starts,
+            arrived=found.arrived,
             stopped=self.pairing.points.count if full else 0,
             cell_size=_named(box, (box.upper - box.lower) / np.array(self.intervals)),
             touching=tuple(_named(box, place) for place in cells.touching),

@@ -71,7 +71,8 @@ class Change:
 
 
 CHANGES: Mapping[str, Change] = {
-    "Audit": Change(version=8),
+    "Audit": Change(version=9),
+    "Completeness": Change(version=2),  # older ones do not count their starts
     "LeastSnap": Change(version=2),
     "Proof": Change(version=3, removed=("status",)),  # it follows from `why` and `bounds`
     "RobustOptimum": Change(version=2),  # older ones have no number of exchanges

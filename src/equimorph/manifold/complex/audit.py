@@ -32,7 +32,9 @@ class Audit:
     negative eigenvalues, counted anew at every vertex, are not those of their index, or one beyond
     a constraint, as where a descriptor jumps.
     Of the equilibria found by random search at random points, `recovered` were missing and have
-    been added; in the last round, `missing` of `checked` were, which must be zero too.
+    been added; in the last round, `missing` of `checked` were, which must be zero too. Of the
+    random `starts` of these searches `arrived` led to a state: where few do, the searches miss more
+    than `missing_at_most` says.
 
     `descents` counts how descents from vertices of the strata of index one, and from folds, ended;
     `on_lines` how many equilibria random lines in actuators and loads met that begin at vertices of
@@ -97,6 +99,8 @@ class Audit:
     left_out: int = 0
     on_lines: int = 0
     grazing: tuple[tuple[tuple[str, float], ...], ...] = ()
+    starts: int = 0
+    arrived: int = 0
 
     def __repr__(self) -> str:
         """Whether it is clean, else what is not; sizes."""
@@ -185,7 +189,7 @@ class Audit:
                 f"{self.missing} of {self.checked} equilibria found at random points are missing, "
                 f"{self.recovered} added before; with 95 % confidence fewer than "
                 f"{_percent(self.missing_at_most)} of what such searches meet is missing; states "
-                "that they meet rarely may be missing more often"
+                f"that they meet rarely may be missing more often{self._arrivals}"
                 if self.checked
                 else "not made: pieces that the seeds do not reach may be missing",
             ),
@@ -197,6 +201,11 @@ class Audit:
             *([("closed pieces, necks", self._unseen)] if self.cell_size else []),
             *(refined if self.accuracy else []),
         ]
+
+    @property
+    def _arrivals(self) -> str:
+        """How many starts of the searches arrived; nothing where none were counted."""
+        return f"; {self.arrived} of {self.starts} starts arrived" if self.starts else ""
 
     @property
     def _touching(self) -> str:

@@ -44,7 +44,8 @@ class Check:
     descents: how many descents from unstable strata ended how; what they landed on is among those
     that were found. on_lines: states that lines through the strata met. left_out: states that the
     set lacks, and the discretisation does not resolve. grazing: points of sides in which sheets
-    end that lie beyond the box.
+    end that lie beyond the box. starts, arrived: random guesses of the searches, and those that led
+    to a state.
     """
 
     found: int
@@ -53,6 +54,8 @@ class Check:
     on_lines: int = 0
     left_out: int = 0
     grazing: Places = field(default_factory=lambda: np.zeros((0, 0)))
+    starts: int = 0
+    arrived: int = 0
 
 
 def check(
@@ -109,7 +112,11 @@ def _missing(eset: EquilibriumSet, places: list[dict[str, float]], seed: int) ->
     good = structure.may_resolve(coarse.z, coarse.p)
     good &= are_feasible(eset.constraints, coarse.z, coarse.p)
     left_out = _lacking(coarse[np.flatnonzero(good)], eset)
-    return Check(len(found), lacking, led.outcomes, len(met), len(left_out), grazing)
+    starts, arrived = (
+        sum(getattr(each.completeness, name) for each in searched) for name in ("starts", "arrived")
+    )
+    outcome = len(found), lacking, led.outcomes, len(met), len(left_out), grazing
+    return Check(*outcome, starts, arrived)
 
 
 def _in_sides(eset: EquilibriumSet, generator: np.random.Generator) -> tuple[States, Places]:

@@ -113,10 +113,15 @@ def _from_search(
 
 
 def is_symmetric(setting: Setting) -> bool:
-    """Whether a symmetry of the structure leaves all parameters in the box where they are."""
+    """Whether a symmetry of the structure leaves all parameters in the box where they are.
+
+    Those along orbits do not count: every state is one of two opposite ones of its orbit, so that
+    no sheet is its own image, but on an axis, and no pieces come apart at such sheets.
+    """
     inside = setting.base.copy()
     inside[setting.free] = np.sqrt(np.arange(2.0, 2.0 + len(setting.free)))  # no number twice
     return any(
         np.array_equal(symmetry.image(inside), inside)
         for symmetry in setting.structure.symmetries()
+        if not symmetry.along_orbits
     )
