@@ -21,7 +21,6 @@ from equimorph.arrays import (
     ItemValues,
     Lanes,
     Parameters,
-    Places,
     Some,
     Values,
 )
@@ -39,6 +38,8 @@ from equimorph.manifold.lookup.exact_states import (
 from equimorph.manifold.lookup.near_crossings import at_amplitudes
 from equimorph.manifold.lookup.rims import cells_beside
 from equimorph.structures import States, Structure
+
+PlacesOver = Float[np.ndarray, "points d"]
 
 SHARES = np.linspace(-1.0, 1.0, 17) ** 3
 """Amplitudes, in shares of the largest, at which r and its slope are computed. r is nearly cubic:
@@ -71,11 +72,11 @@ class NearCusps(Columns):
     p: Parameters
     b: Lanes
     reach: Values
-    lower: Places
-    upper: Places
+    lower: Float[np.ndarray, "lanes d"]
+    upper: Float[np.ndarray, "lanes d"]
     beside: Int[np.ndarray, "lanes most"]
 
-    def states(self, structure: Structure, p: Points, x: Places, index: CellNumbers) -> Found:
+    def states(self, structure: Structure, p: Points, x: PlacesOver, index: CellNumbers) -> Found:
         """States over points with free parameters `x`, those points, sorted, and their cells.
 
         `index` is that of all cells of the set.
@@ -131,10 +132,12 @@ def _roots(
     return lane, s[lane, node] + low * step[lane, node]
 
 
-def united(structure: Structure, first: Found, second: Found) -> Found:
-    """States of both, equal ones once, sorted by point and cell."""
-    z, point, cell = (np.concatenate(pair) for pair in zip(first, second, strict=True))
-    also = np.unique(second[1])
+def united(structure: Structure, parts: list[Found]) -> Found:
+    """States of two parts, equal ones once, sorted by point and cell."""
+    also = np.unique(parts[1][1])
+    if len(also) == 0:
+        return parts[0]
+    z, point, cell = (np.concatenate(pair) for pair in zip(*parts, strict=True))
     kept = [np.flatnonzero(~np.isin(point, also))]
     for number in also:
         mine = np.flatnonzero(point == number)

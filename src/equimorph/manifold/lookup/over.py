@@ -183,7 +183,7 @@ class Sheets:
         """States found over points, and those that cells next to cusps hide."""
         z, point, cell = cusps.states(self.structure, p, p[:, self.free], self.cell_index)
         good = self.structure.resolved(z, p[point]) & are_feasible(self.constraints, z, p[point])
-        return united(self.structure, found, (z[good], point[good], cell[good]))
+        return united(self.structure, [found, (z[good], point[good], cell[good])])
 
     def _beside_crossings(
         self, crossings: NearCrossings, p: Points, z: Lanes, point: Numbers, cell: Numbers
