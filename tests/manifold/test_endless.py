@@ -11,12 +11,41 @@ from typecheck import unchecked
 def test_a_set_that_winds_for_ever_is_refused(monkeypatch):
     monkeypatch.setattr(flood, "ENDLESS", 12)
     load = em.Parameter("p", "1", 1.0, "load")
-    winding = em.EnergyStructure("-cos(theta) - p*theta", ["theta"], [load])
+    winding = em.EnergyStructure("-cos(1.4142135623730951*theta) - p*theta", ["theta"], [load])
     said = (
         r"`within` must leave at most 12 equilibria over a point; got more over p = .* endless set"
     )
     with unchecked(), pytest.raises(em.InputError, match=said):
         em.equilibrium_set(winding, em.Box(p=(-2, 2)), intervals=(3,))
+
+
+def winding_twice() -> em.EnergyStructure:
+    """A pendulum that winds, and a spring: whole turns of θ alone lead to the same state."""
+    load = em.Parameter("p", "1", 1.0, "load")
+    return em.EnergyStructure("-cos(theta) - p*theta + (x - p)**2/2", ["theta", "x"], [load])
+
+
+def test_a_state_that_whole_turns_repeat_is_refused_early_and_by_name():
+    """Six copies are enough where more turns violate no constraint."""
+    said = r"`within` must bound whole turns: over p = .* 6 times, and without end"
+    with unchecked(), pytest.raises(em.InputError, match=said):
+        em.equilibrium_set(winding_twice(), em.Box(p=(-2, 2)), intervals=(3,))
+
+
+def test_a_state_that_whole_turns_repeat_as_often_as_a_bound_lets_them_is_lifted():
+    angle = em.Descriptor("angle", "1", lambda z, p: np.abs(z[:, 0]))
+    with unchecked():
+        eset = em.equilibrium_set(
+            winding_twice(), em.Box(p=(-0.5, 2)), intervals=(9,), within=[angle <= 25.0]
+        )
+        turned = eset.over(p=[0.3]).states.z[:, 0]
+    assert eset.audit.clean
+    # sin θ = p: −25 to 25 holds eight of each of both branches
+    own = np.concatenate([np.arcsin(0.3) + 2 * np.pi * np.arange(-4, 5)])
+    other = np.pi - np.arcsin(0.3) + 2 * np.pi * np.arange(-5, 5)
+    true = np.concatenate([own, other])
+    true = true[np.abs(true) <= 25.0]
+    np.testing.assert_allclose(np.sort(turned), np.sort(true), atol=1e-9)
 
 
 def test_a_set_larger_than_its_limit_is_returned_as_far_as_it_is_known():
@@ -25,7 +54,7 @@ def test_a_set_larger_than_its_limit_is_returned_as_far_as_it_is_known():
     eset = em.equilibrium_set(em.Spring(), box, intervals=(20, 20), checks=0, limit=500)
     assert 500 < eset.audit.stopped < 900
     assert not eset.audit.clean
-    assert ("lifting stopped", f"at {eset.audit.stopped} equilibria, more than the limit") in (
+    assert ("lifting stopped", f"at {eset.audit.stopped} equilibria: no room within the limit") in (
         eset.audit.rows()
     )
     assert eset.points.residual.max() < 1e-9

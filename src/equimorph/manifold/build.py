@@ -12,7 +12,7 @@ from equimorph.manifold.complex.description import Frame, wrong_cells
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.manifold.complex.kept_sets import Effort, question_of_set, recall_set
 from equimorph.manifold.geometry.setting import Setting
-from equimorph.manifold.lifting.cells import CellFinder, Cells, account
+from equimorph.manifold.lifting.cells import CellFinder, Cells, Outlook, account
 from equimorph.manifold.lifting.completeness import Check, check, recover
 from equimorph.manifold.lifting.crossing_branches import flood_crossings, ring_middles
 from equimorph.manifold.lifting.flood import flood
@@ -55,9 +55,6 @@ RECOVERED = 200
 """Missing states, spread over all that were found, whose surroundings are lifted at once."""
 MENDED = 8
 """Rounds of bisection around cells of a wrong sense: two tripods needed one and two."""
-HOPELESS = 50
-"""Stop bisecting once more than 50 cells, and 4× the initial number, are undecided."""
-
 ROOM = 3.0
 """Default `room` of a set, see `Effort`: a truss with 220 states over a point needed 2.7 times what
 was over its grid, and has no more than 66 003 equilibria."""
@@ -113,8 +110,9 @@ def equilibrium_set(  # noqa: PLR0913  # the knobs of the public face, most by k
         the grid is too coarse: one of twice the intervals is lifted, at most twice.
     limit
         Largest number of equilibria over the grid. Beyond it lifting stops, the set holds what is
-        known by then, and its audit reports it (`stopped`). Default: 60 000, or 30 per grid point
-        if that is more; cells that are divided may bring up to three times what was there before.
+        known by then, and its audit reports it (`stopped`); so where the division of all undecided
+        cells would lead beyond it. Default: 60 000, or 30 per grid point if that is more; cells
+        that are divided may bring up to three times what was there before.
     tiles
         Numbers of parts along each parameter into which the grid is cut: edges are lifted and cells
         closed in each part by itself, and glued. The set is the same, up to the order of its
@@ -228,11 +226,13 @@ def _complete(
     generator = np.random.default_rng([effort.seed, 1])
     recovered = 0
     for number in range(SEARCHES):
+        # what stays undecided in spite of bisection is not mended by more equilibria
+        if pairing.is_full or Outlook.is_dim(cells):
+            found = Check(0, eset.points[:0])
+            break
         found = check(eset, generator, _checks(effort.checks, order.setting), order.progress)
         lacking = len(found.missing)
-        # what stays undecided in spite of bisection is not mended by more equilibria
-        ended = pairing.is_full or cells.doubtful > HOPELESS
-        if lacking == 0 or ended or number == SEARCHES - 1:
+        if lacking == 0 or number == SEARCHES - 1:
             break
         recovered += lacking
         some = np.unique(np.linspace(0, lacking - 1, RECOVERED).astype(int))
@@ -259,7 +259,7 @@ class _Lifting:
         self.pairing.fit()
         cells, eset = self._lift()
         for _ in range(MENDED):
-            if not _divide_wrong(self.pairing, eset):
+            if Outlook.is_dim(cells) or not _divide_wrong(self.pairing, eset):
                 break
             cells, eset = self._lift()
         return cells, eset
@@ -276,17 +276,14 @@ class _Lifting:
         Tiles take part in the first round; the others touch few cells.
         """
         pairing, unseen = self.pairing, self.unseen
-        bisected = first = 0
+        bisected, outlook = 0, None
         rounds = BISECTIONS[pairing.mesh.dimension]
         for number in range(rounds):
             cells = self._lift_cells(self.tiles if number == 0 else None)
             self._make_room()
-            doubtful = cells.doubtful
-            first = doubtful if number == 0 else first
-            # along a line where the set is singular doubt only multiplies; elsewhere it vanishes
-            hopeless = doubtful > max(HOPELESS, 4 * first)
-            last = hopeless or pairing.is_full or number == rounds - 1
-            if doubtful == 0 or last:
+            outlook = outlook or Outlook.of(pairing, cells)
+            last = outlook.is_hopeless(pairing, cells) or number == rounds - 1
+            if cells.doubtful == 0 or last:
                 cells = _look(pairing, cells, self.finder, unseen)
             if cells.doubtful == 0 or last:
                 break
@@ -315,7 +312,8 @@ class _Lifting:
         self, cells: Cells, eset: EquilibriumSet, found: Check, recovered: int
     ) -> EquilibriumSet:
         """The set with what the checks found in its audit."""
-        box, full = self.order.box, self.pairing.is_full
+        box = self.order.box
+        full = self.pairing.is_full or Outlook.is_crowded(self.pairing, cells)
         audit = replace(
             eset.audit,
             checked=found.found,

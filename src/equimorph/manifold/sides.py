@@ -53,7 +53,10 @@ NEARER = 0.5
 
 
 def is_stuck_at_sides(pairing: Pairing, cells: Cells) -> bool:
-    """Whether most of what could not be decided or lifted touches sides of the box."""
+    """Whether what could not be decided or lifted touches sides of the box, more than by chance.
+
+    Most of the cells of a coarse grid touch sides.
+    """
     mesh = pairing.mesh
     if pairing.is_full:
         return False
@@ -61,12 +64,16 @@ def is_stuck_at_sides(pairing: Pairing, cells: Cells) -> bool:
     on_side = ((mesh.vertices == low) | (mesh.vertices == high)).any(axis=1)
     lost = np.array([edge for _, edge in abandoned_rays(pairing)], int)
     groups = (
-        mesh.triangles[cells.doubtful_triangles],
-        mesh.tetrahedra[cells.doubtful_tetrahedra],
-        mesh.edges[lost],
+        (mesh.triangles, cells.doubtful_triangles),
+        (mesh.tetrahedra, cells.doubtful_tetrahedra),
+        (mesh.edges, lost),
     )
-    touching = np.concatenate([on_side[own].any(axis=1) for own in groups])
-    return bool(len(touching)) and bool(2 * touching.sum() > len(touching))
+    count, touching, by_chance = 0, 0, 0.0
+    for every, some in ((on_side[of].any(axis=1), own) for of, own in groups if len(own)):
+        count += len(some)
+        touching += int(every[some].sum())
+        by_chance += len(some) * float(every.mean())
+    return 2 * touching > count + by_chance
 
 
 def widened(lines: Lines, limits: Float[np.ndarray, "2 d"]) -> Lines:

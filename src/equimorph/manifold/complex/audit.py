@@ -53,7 +53,8 @@ class Audit:
     finer elements resolve them (`Rod.resolving`), or a constraint excludes them.
 
     `stopped`, which must be zero, is the number of equilibria at which lifting stopped because it
-    exceeded the limit; much is unpaired and undecided then.
+    exceeded the limit, or would have when undecided cells are halved; much is unpaired and
+    undecided then. Where much is undecided, no completeness checks are made.
 
     Of refined sets: the `accuracy` that was asked for, the largest `deviation` of straight cells
     from the set as their edges show it, how many edges are `unrefined` (they could not be
@@ -166,7 +167,7 @@ class Audit:
             refined.append(("smallest angle off crossings", f"{self.smallest_free_angle:.1f}°"))
         if self.smallest_dihedral:
             refined.append(("smallest dihedral angle", f"{self.smallest_dihedral:.1f}°"))
-        stopped = ("lifting stopped", f"at {self.stopped} equilibria, more than the limit")
+        stopped = ("lifting stopped", f"at {self.stopped} equilibria: no room within the limit")
         return [
             *([stopped] if self.stopped else []),
             ("equilibria (vertices)", str(self.vertices)),

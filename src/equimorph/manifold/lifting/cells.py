@@ -163,6 +163,57 @@ class Cells:
 Close = Callable[[Pairing], tuple[Discs, Balls]]
 
 
+HOPELESS = 50
+"""Bisection may end once more cells are undecided."""
+MULTIPLIED = 4
+"""Undecided cells, over what there were at first, beyond which bisection ends."""
+GROWN = 3
+"""Equilibria, over what there were at first, that must have paid: fewer cells are undecided."""
+
+
+@dataclass(frozen=True)
+class Outlook:
+    """Undecided cells and equilibria of a grid before it is bisected.
+
+    See docs/decisions.md, "Bisection ends where it does not help".
+    """
+
+    doubtful: int
+    points: int
+
+    @classmethod
+    def of(cls, pairing: Pairing, cells: Cells) -> "Outlook":
+        """Return that of a grid."""
+        return cls(cells.doubtful, pairing.points.count)
+
+    @staticmethod
+    def is_dim(cells: Cells) -> bool:
+        """Whether so much is undecided that bisection may have ended."""
+        return cells.doubtful > HOPELESS
+
+    @staticmethod
+    def is_crowded(pairing: Pairing, cells: Cells) -> bool:
+        """Whether much is undecided, and halving these cells would lead beyond the limit.
+
+        As many rounds of bisection as there are parameters halve cells.
+        """
+        share = min(cells.doubtful / max(len(pairing.mesh.cells), 1), 1.0)
+        growth = (1.0 + share) ** pairing.mesh.dimension
+        return Outlook.is_dim(cells) and pairing.points.count * growth > pairing.limit
+
+    def is_hopeless(self, pairing: Pairing, cells: Cells) -> bool:
+        """Whether bisection leads nowhere: doubt multiplies, persists, or there is no room.
+
+        Along a line where the set is singular doubt only multiplies; elsewhere it vanishes.
+        """
+        if pairing.is_full or not self.is_dim(cells):
+            return pairing.is_full
+        grown = pairing.points.count > GROWN * self.points
+        persists = cells.doubtful >= self.doubtful and grown
+        multiplies = cells.doubtful > MULTIPLIED * self.doubtful
+        return multiplies or persists or self.is_crowded(pairing, cells)
+
+
 class CellFinder:
     """Finds the cells of the set over a mesh that is being bisected."""
 
