@@ -172,3 +172,28 @@ def test_branch_points_have_a_look_of_their_own_in_figures(atlas):
     drawn = {line.get_linestyle() for line in ax.get_lines()}
     assert len(drawn) >= 2
     plt.close(ax.figure)
+
+
+def test_states_that_are_not_resolved_are_named(pitchfork, monkeypatch):
+    """Of x (x² − a − 0.3·b) = 0 the states with x > 0.4 count as not resolved.
+
+    On the cylinder (x, b) leads to one state, and (x², b) to two. Such states were dropped in
+    silence: the chart had a "gap" there, and there seemed to be one solution fewer.
+    """
+    monkeypatch.setattr(type(pitchfork.structure), "resolved", lambda self, z, p: z[:, 0] <= 0.4)
+    with unchecked():
+        cylinder = part(
+            pitchfork, np.abs(pitchfork.points.z[pitchfork.cells, 0]).max(axis=1) > 1e-9
+        )
+        chart = charts.DescriptorChart(cylinder, (X, "b"))
+        found = chart.state(np.array([[0.5, 0.2], [-0.7, 0.4]]))
+        beyond = em.solve_shape(cylinder, {X: 0.5, em.value_of(chart.eset.structure, "b"): 0.2})
+        square = Descriptor("x²", "1", lambda z, p: z[:, 0] ** 2)
+        both = em.solve_shape(cylinder, {square: 0.25, em.value_of(cylinder.structure, "b"): 0.2})
+    assert found.status.tolist() == ["not resolved", "inside"]
+    assert np.isnan(found.states.z[0, 0])
+    assert (beyond.status, beyond.unresolved) == ("refused", 1)
+    assert beyond.why.endswith("; 1 left out that the discretisation does not resolve")
+    np.testing.assert_allclose(both.states.z[:, 0], [-0.5], atol=1e-9)
+    assert both.unresolved == 1
+    assert "1 left out" in repr(both)

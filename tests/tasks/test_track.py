@@ -5,6 +5,7 @@ F/k = (1 − x_l/cos δ) sin δ; states are stable where x_l > cos³ δ.
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 import equimorph as em
 from equimorph.errors import InputError
@@ -45,6 +46,33 @@ def test_angle_is_lowered_at_fixed_load(start):
     delta = found.values[ANGLE.name]
     assert found.path.states["x_l"] == pytest.approx([support(d, LOAD) for d in delta], abs=1e-11)
     assert found.margin > 0
+
+
+@pytest.mark.parametrize("goal", [0.40, 0.30, 0.75])
+def test_misses_between_rows_are_those_of_the_closed_form(start, goal):
+    """Half-way between rows x_l is the mean of two, δ its root, and the target the mean of both."""
+    found = em.track(start, {ANGLE: goal}, actuators=["x_l"])
+    delta, x_l = found.values[ANGLE.name], found.schedule.values[:, 0]
+    misses = []
+    for a, b, x in zip(delta[:-1], delta[1:], 0.5 * (x_l[:-1] + x_l[1:]), strict=True):
+        low, high = sorted((a, b))
+        root = brentq(lambda d, x=x: (1 - x / np.cos(d)) * np.sin(d) - LOAD, low, high, xtol=1e-15)
+        misses.append(abs(root - 0.5 * (a + b)))
+    assert found.between == {ANGLE.name: pytest.approx(max(misses), rel=1e-6)}
+    assert f"{max(misses):.2g} off" in repr(found)
+
+
+def test_curves_are_missed_between_rows_by_their_bend_too(start):
+    """δ(t) = 0.62 − 0.2 t²: the target half-way is that of the curve, not the mean of two rows."""
+    found = em.track(start, lambda t: {ANGLE: 0.62 - 0.2 * t**2}, actuators=["x_l"])
+    t, x_l = found.path.at, found.schedule.values[:, 0]
+    middle, delta = 0.5 * (t[:-1] + t[1:]), found.values[ANGLE.name]
+    misses = []
+    for a, b, x, s in zip(delta[:-1], delta[1:], 0.5 * (x_l[:-1] + x_l[1:]), middle, strict=True):
+        low, high = sorted((a, b))
+        root = brentq(lambda d, x=x: (1 - x / np.cos(d)) * np.sin(d) - LOAD, low, high, xtol=1e-15)
+        misses.append(abs(root - (0.62 - 0.2 * s**2)))
+    assert found.between[ANGLE.name] == pytest.approx(max(misses), rel=1e-6)
 
 
 def test_angle_beyond_the_stability_boundary_is_a_snap(start):

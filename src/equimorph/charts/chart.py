@@ -33,7 +33,7 @@ from equimorph.model import Descriptor
 from equimorph.structures import State, States
 from equimorph.tolerances import SAME_STATE
 
-STATUSES = ("inside", "gap", "barrier", "beyond the box", "not single-valued")
+STATUSES = ("inside", "gap", "barrier", "beyond the box", "not single-valued", "not resolved")
 """Where points lie; only those inside have a state."""
 
 DEPENDENT = 1e-7
@@ -48,6 +48,7 @@ class PointStatus(IntEnum):
     BARRIER = 2
     BEYOND_THE_BOX = 3
     NOT_SINGLE_VALUED = 4
+    NOT_RESOLVED = 5
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,7 +151,8 @@ class Chart(ABC):
         Returns
         -------
         States and, for each point, where it lies: "inside", in a "gap", on a "barrier", "beyond the
-        box", or where the coordinates are "not single-valued".
+        box", where the coordinates are "not single-valued", or where the discretisation does "not
+        resolve" any state that was found.
 
         Raises
         ------
@@ -159,12 +161,15 @@ class Chart(ABC):
         """
         points = self._check_width(coords)
         found = self.find(points)
+        resolved = found.states.resolved if len(found.states) else np.zeros(0, bool)
+        left, found = found.point[~resolved], found.take(resolved)
         count = np.bincount(found.point, minlength=len(points))
         code = np.full(len(points), PointStatus.GAP)
         code[count == 1] = PointStatus.INSIDE
         code[count > 1] = PointStatus.NOT_SINGLE_VALUED
         empty = np.flatnonzero(count == 0)
         code[empty[self._beyond(points[empty])]] = PointStatus.BEYOND_THE_BOX
+        code[left[count[left] == 0]] = PointStatus.NOT_RESOLVED
         return self._answers(found.take(count[found.point] == 1), code)
 
     @check_arguments

@@ -270,7 +270,6 @@ class Cells:
         low, high = self._indices
         good = good & (index >= low[cell]) & (index <= high[cell])
         good &= self.eset.box.holds(p[:, self.coordinates.setting.free], slack=SLACK)
-        good[good] = self.eset.structure.resolved(z[good], p[good])
         good[good] = are_feasible(self.eset.constraints, z[good], p[good], SLACK)
         return good
 

@@ -78,7 +78,9 @@ CHANGES: Mapping[str, Change] = {
     "RobustOptimum": Change(version=2),  # older ones have no number of exchanges
     "Route": Change(version=4),  # older ones have no bottleneck, survival or relaxations
     "Schedule": Change(version=2),  # older ones have no times
-    "Shapes": Change(version=2, renamed={"wanted": "targets"}),
+    # older ones do not count what is not resolved
+    "Shapes": Change(version=3, renamed={"wanted": "targets"}),
+    "Tracking": Change(version=2),  # older ones say nothing of it
 }
 """Changes by class; a class that is not listed is as it was in version 1."""
 

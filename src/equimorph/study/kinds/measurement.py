@@ -52,7 +52,7 @@ class ShapeKind(Kind[Shapes]):
         states = f"{len(answer)} states, {stable} of them stable"
         if len(answer) == 1:
             states = f"1 {'stable' if stable else 'unstable'} state"
-        return f"**{answer.status}** by {states}.{fitted}"
+        return f"**{answer.status}** by {states}{answer.left_out}.{fitted}"
 
     def details(self, question: Question, answer: Shapes) -> list[str]:
         """A table of them, with the way to each."""

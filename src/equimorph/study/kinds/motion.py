@@ -162,7 +162,9 @@ class TrackKind(Kind[Tracking]):
             change = max((abs(value) for value in turn.values()), default=0.0)
             back = f" The targets close; the actuators come back within {change:.0e}."
         margin = html.number(answer.margin)
-        return f"**arrived** on stable states alone, smallest margin {margin}.{back}"
+        misses = ", ".join(f"{name} by {html.number(x, 2)}" for name, x in answer.between.items())
+        off = f" Between rows of the schedule it misses {misses} at most." if misses else ""
+        return f"**arrived** on stable states alone, smallest margin {margin}.{back}{off}"
 
     def details(self, question: Question, answer: Tracking) -> list[str]:
         """What comes nearest to the targets after a failure."""

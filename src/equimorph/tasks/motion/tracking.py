@@ -1,7 +1,7 @@
 """`track`: actuators that lead descriptors along given targets while loads move."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal
 
@@ -14,6 +14,7 @@ from equimorph.equilibria.trace_options import VIOLATIONS
 from equimorph.errors import InputError
 from equimorph.model import Constraint, Descriptor, Schedule, position
 from equimorph.structures import State, States
+from equimorph.tasks.motion.between_rows import misses_between
 from equimorph.tasks.motion.blocks import DENSE, path_by_blocks, same_descriptors, stable_path
 from equimorph.tasks.motion.course import Course, actuator_bounds
 from equimorph.tasks.motion.redundant import follow_redundant
@@ -52,6 +53,9 @@ class Tracking:
     compromise
         Beyond the failure, if requested: the stable states with the least half sum of squared
         misses of the targets.
+    between
+        Largest misses of the targets, by name, half-way between the rows of the schedule, where
+        parameters move straight from row to row; infinite where no stable state was found there.
     """
 
     status: Literal["arrived", "refused"]
@@ -62,11 +66,14 @@ class Tracking:
     actuators: tuple[str, ...] = ()
     schedule: Schedule | None = None
     compromise: FollowedOptimum | None = None
+    between: Mapping[str, float] = field(default_factory=dict)
 
     def __repr__(self) -> str:
-        """Margin, or why and where it fails."""
+        """Margin and misses, or why and where it fails."""
         if self.arrived:
-            return f"Tracking(arrived: margin {self.margin:.4g})"
+            misses = "".join(f", {name} {by:.2g} off" for name, by in self.between.items())
+            rows = " between rows" if misses else ""
+            return f"Tracking(arrived: margin {self.margin:.4g}{misses}{rows})"
         return f"Tracking(refused at {self.last_good:.6g}: {self.why})"
 
     @property
@@ -155,8 +162,9 @@ def track(  # the knobs of the public face, all by keyword
 
     Returns
     -------
-    The motion with its schedule, or where and why it cannot be followed. If a motion returns to its
-    first targets, its actuators need not return: see `Tracking.holonomy`.
+    The motion with its schedule, or where and why it cannot be followed. Its rows meet the targets;
+    `Tracking.between` tells how far they are missed between them. If a motion returns to its first
+    targets, its actuators need not return: see `Tracking.holonomy`.
 
     Raises
     ------
@@ -188,7 +196,8 @@ def track(  # the knobs of the public face, all by keyword
         return Tracking("refused", failure, why, path, asked, names, None, rest)
     monitored = tuple(dict.fromkeys((*asked, *(c.descriptor for c in within), *monitor)))
     schedule = schedule_of(path, path.states.margin, monitored)
-    return Tracking("arrived", "", "", path, asked, names, schedule)
+    between = misses_between(path, legs, asked)
+    return Tracking("arrived", "", "", path, asked, names, schedule, None, between)
 
 
 @dataclass(frozen=True)

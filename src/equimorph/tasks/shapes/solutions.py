@@ -1,7 +1,7 @@
 """`solve_shape`: all equilibria of a set whose descriptors take given values."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
 from typing import Literal
@@ -64,6 +64,9 @@ class Shapes:
     closest, miss
         Vertex of the set whose descriptors come nearest to the targets, and its distance from
         them; see `nearest` for the exact state.
+    unresolved
+        Solutions that the discretisation does not resolve; they are left out, and any number more
+        may be there. Refine it (`rod.resolving`), or exclude them by a constraint.
     """
 
     status: Literal["solved", "fitted", "refused"]
@@ -77,12 +80,21 @@ class Shapes:
     targets: Float[np.ndarray, " k"]
     within: tuple[Constraint, ...]
     known: Predictor | None = field(default=None, metadata=NOT_KEPT)
+    unresolved: int = 0
 
     def __repr__(self) -> str:
         """Number of solutions, or the reason of a refusal."""
         if self.status == "refused":
             return f"Shapes(refused: {self.why})"
-        return f"Shapes({len(self)} states, {int(np.sum(self.index == 0))} of them stable)"
+        stable = int(np.sum(self.index == 0))
+        return f"Shapes({len(self)} states, {stable} of them stable{self.left_out})"
+
+    @property
+    def left_out(self) -> str:
+        """Says that solutions were left out, if any were."""
+        if not self.unresolved:
+            return ""
+        return f"; {self.unresolved} left out that the discretisation does not resolve"
 
     def __len__(self) -> int:
         """Number of solutions."""
@@ -231,9 +243,9 @@ def solve_shapes(
     known = predictor(eset, tuple(targets))
     constraints = tuple(dict.fromkeys((*eset.constraints, *within)))
     if numbers.shape[1] > len(eset.names):
-        groups = [_fit(known, each, constraints) for each in numbers]
+        groups, left = [_fit(known, each, constraints) for each in numbers], [0] * len(numbers)
     else:
-        groups = _solve(known, numbers, constraints)
+        groups, left = _solve(known, numbers, constraints)
     index, own = _sort_keys(eset, [own for own, _ in groups], "" if rank == "route" else rank)
     closest, answers = known.closest(numbers), []
     for k, (values, (states, misfit)) in enumerate(zip(numbers, groups, strict=True)):
@@ -242,7 +254,8 @@ def solve_shapes(
         order = np.lexsort((key, index[k], np.where(misfit > EXACT, misfit, 0.0)))
         ways = tuple(routes[i] for i in order) if routes else ()
         found = states[order], index[k][order], misfit[order], ways
-        answers.append(_answer(known, values, constraints, *found, int(closest[k])))
+        answer = _answer(known, values, constraints, *found, int(closest[k]))
+        answers.append(_with_left_out(answer, left[k]))
     return tuple(answers)
 
 
@@ -295,10 +308,19 @@ def _answer(
     return Shapes(status, why, states, index, misfit, routes, vertex, miss, targets, within, known)
 
 
+def _with_left_out(answer: Shapes, unresolved: int) -> Shapes:
+    """Return the answer with the number of solutions that are not resolved, also in a refusal."""
+    answer = replace(answer, unresolved=unresolved)
+    return replace(answer, why=answer.why + answer.left_out) if answer.why else answer
+
+
 def _solve(
     known: Predictor, targets: Float[np.ndarray, "many k"], within: tuple[Constraint, ...]
-) -> list[tuple[States, Values]]:
-    """Exact solutions of each question in the box and within constraints, each once."""
+) -> tuple[list[tuple[States, Values]], list[int]]:
+    """Exact solutions of each question in the box and within constraints, each once.
+
+    And how many more there are that the discretisation does not resolve.
+    """
     structure, eset, charted = known.eset.structure, known.eset, None
     if targets.shape[1] == len(eset.names) and known.chart is not None:
         charted = known.chart.find(targets)
@@ -313,24 +335,25 @@ def _solve(
         found = np.concatenate([found, np.ones(len(charted.point), bool)])[order]
         owner = owner[order]
     found &= eset.box.holds(p[:, known.setting.free], slack=AT_EDGE)
-    found[found] &= structure.resolved(z[found], p[found])
     found[found] &= worst_relative_excess(within, z[found], p[found]) <= AT_EDGE
     states, owner = States(structure, z[found], p[found]), owner[found]
     held = known.holds(states)
     states, owner = states[held], owner[held]
     bounds = np.searchsorted(owner, np.arange(len(targets) + 1))
-    groups = []
+    groups, left = [], []
     for first, last in pairwise(bounds):
         own = states[first:last]
         own = own[distinct(own, SAME_STATE)]
-        groups.append((own, np.zeros(len(own))))
+        resolved = own.resolved if len(own) else np.zeros(0, bool)
+        left.append(int(np.sum(~resolved)))
+        groups.append((own[resolved], np.zeros(int(resolved.sum()))))
     if targets.shape[1] < len(eset.names):
         # the shortest way to a family may leave the box
         groups = [
             group if len(group[0]) else _members(known, values, within)
             for group, values in zip(groups, targets, strict=True)
         ]
-    return groups
+    return groups, left
 
 
 def _members(
