@@ -7,7 +7,7 @@ import pytest
 
 import equimorph as em
 from equimorph.linalg.condensed import PIVOT_GUARD
-from equimorph.structures.newton import Limits, newton
+from equimorph.structures.newton import Limits, Through, newton
 from equimorph.structures.rod.clamped_kernels import advance_lanes
 
 LIMITS = Limits(12, 0.7, 2.0, 1e-14, following=1e-14, contraction=0.9, free=2)
@@ -20,20 +20,48 @@ def guesses():
     return rod, rod.sample(p, np.random.default_rng(2)), p
 
 
+@pytest.mark.parametrize("moving", [False, True])
 @pytest.mark.parametrize("lanes", [0, 1, 8, 23])
 @pytest.mark.parametrize("guard", [1e-3, np.inf])
-def test_the_compiled_loop_takes_the_steps_of_the_structure(guesses, lanes, guard):
+def test_the_compiled_loop_takes_the_steps_of_the_structure(guesses, lanes, guard, moving):
     """Bit by bit, whether no, some or all steps (an infinite guard) are taken by `advance`."""
-    rod, z, p = guesses
-    found = newton(rod, z[:lanes], p[:lanes], LIMITS)
-    rod.mechanics.compiled_newton = replace(rod.compiled_newton, guard=guard)
-    plain = newton(rod, z[:lanes], p[:lanes], LIMITS)
-    if guard == np.inf:
+    rod, z, p = (each if k == 0 else each[:lanes] for k, each in enumerate(guesses))
+    through = plane(z, p) if moving else None
+    found = newton(rod, z, p, LIMITS, through)
+    rod.mechanics.compiled_newton = replace(rod.compiled_newton, guards=(guard, guard))
+    plain = newton(rod, z, p, LIMITS, through)
+    if moving or guard == np.inf:
         for one, other in zip(vars(found).values(), vars(plain).values(), strict=True):
             np.testing.assert_array_equal(one, other)
     np.testing.assert_array_equal(found.status, plain.status)
     if lanes == 23:
         assert 0 < found.found.sum() < lanes
+
+
+def plane(z, p):
+    """Planes in which the load moves with the states."""
+    dp = np.tile([0.0, 0.0, 1.0, 0.0], (len(p), 1))
+    return Through(dp, 0.01 * np.cos(z), np.linspace(0.5, 1.5, len(p)))
+
+
+@pytest.mark.parametrize("moving", [False, True])
+def test_threads_that_share_lanes_take_the_same_steps(moving):
+    """Bit by bit; lanes that need not contract and lengths of their own go along with them."""
+    rod, generator, lanes = em.Rod(load="uniform"), np.random.default_rng(3), 1700
+    p = np.tile([1.0, 0.1, 2.5, np.sin(1.0)], (lanes, 1))
+    z = rod.sample(p, generator)
+    limits = replace(LIMITS, too_long=generator.uniform(1.0, 5.0, lanes), exempt=np.arange(lanes) % 3)
+    through = plane(z, p) if moving else None
+    em.set_threads(1)
+    alone = newton(rod, z, p, limits, through)
+    try:
+        em.set_threads(3)
+        shared = newton(rod, z, p, limits, through)
+    finally:
+        em.set_threads()
+    for one, other in zip(vars(alone).values(), vars(shared).values(), strict=True):
+        np.testing.assert_array_equal(one, other)
+    assert len(np.unique(alone.status)) > 2
 
 
 def test_corrections_with_small_pivots_lead_to_exact_states():

@@ -36,9 +36,9 @@ class Advance:
 
 @dataclass(frozen=True)
 class CompiledNewton:
-    """Newton's method at fixed parameters as one loop over the kernel of a structure's step.
+    """Newton's method as one loop over the kernel of a structure's step.
 
-    Its steps are those of `Equations.correction`.
+    Its steps are those of `Equations.correction` at fixed parameters, else of `Equations.advance`.
 
     Parameters
     ----------
@@ -46,15 +46,16 @@ class CompiledNewton:
         `newton_kernels.newton_of`, made with the structure's step.
     tables
         What it shares among lanes.
-    guard
-        Least ratio of the pivots of a step; below it `Equations.correction` takes the step.
+    guards
+        Least ratios of the pivots of a step, at fixed parameters and in planes; below them those
+        methods take the step.
     widths
         Entries of z and p.
     """
 
     run: Callable[..., tuple[int, int]]
     tables: tuple[tuple[np.ndarray, ...], ...]
-    guard: float
+    guards: tuple[float, float]
     widths: tuple[int, int]
 
 
@@ -179,7 +180,7 @@ class Equations(ABC):
 
     @property
     def compiled_newton(self) -> CompiledNewton | None:
-        """Newton's method at fixed parameters, compiled as a whole; None: it is not."""
+        """Newton's method compiled as a whole; None: it is not."""
         return None
 
     def advance(

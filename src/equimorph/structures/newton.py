@@ -7,13 +7,15 @@ See docs/decisions.md, "One corrector".
 """
 
 from dataclasses import dataclass
+from functools import partial
+from itertools import pairwise
 from typing import Protocol, runtime_checkable
 
 import numpy as np
 
 from equimorph.arrays import Flags, Float, Int, Lanes, Parameters, Values
 from equimorph.linalg.compiled import is_awaited
-from equimorph.linalg.lanes import shares_of
+from equimorph.linalg.lanes import results_of, shares_of
 from equimorph.linalg.simd import LANES
 from equimorph.structures import newton_kernels
 from equimorph.structures.equations import Advance, CompiledNewton
@@ -37,7 +39,7 @@ class Steps(Protocol):
 
     @property
     def compiled_newton(self) -> CompiledNewton | None:
-        """Newton's method at fixed parameters, compiled as a whole; None: it is not."""
+        """Newton's method compiled as a whole; None: it is not."""
 
     def advance(
         self, z: Lanes, p: Parameters, dp: Parameters, row: Lanes, corner: Values, defect: Values
@@ -82,6 +84,21 @@ class Limits:
     free: int = 0
     exempt: Numbers | None = None
     multipliers: float = 0.0
+
+    def take(self, some: Numbers) -> "Limits":
+        """Limits of some of the lanes."""
+        too_long, exempt = self.too_long, self.exempt
+        return Limits(
+            self.iterations,
+            self.longest,
+            too_long[some] if isinstance(too_long, np.ndarray) else too_long,
+            self.converged,
+            self.following,
+            self.contraction,
+            self.free,
+            None if exempt is None else exempt[some],
+            self.multipliers,
+        )
 
     def too_long_of(self, lanes: int) -> Values:
         """Lengths at which lanes are given up, one each."""
@@ -152,6 +169,9 @@ def newton(
     The limits say how long steps may be, and when a lane ends.
     """
     (lanes, size), k = z.shape, 0 if through is None else 1
+    loop = _loop_of(equations, z, p)
+    if loop is not None and (shares := shares_of(lanes)) > 1:
+        return _shared(equations, z, p, limits, through, shares)
     # structures compute whole blocks of lanes: the rest of one goes with the first lane
     rows = np.arange(lanes) if lanes >= LANES else _FILLED[lanes]
     most = len(rows)
@@ -165,11 +185,10 @@ def newton(
     given = result, (limits.too_long_of(lanes), exempt), weights, limits.lengths
     longest, left, number = float(limits.longest), lanes, 0
     free = limits.iterations if limits.contraction == np.inf else limits.free
-    loop = _loop_of(equations, work) if through is None else None
     while left > 0 and number < limits.iterations:
         if loop is not None:
             rule, progress = (longest, free, limits.iterations), (left, number)
-            left, number = loop.run(loop.tables, loop.guard, work, progress, *given, rule)
+            left, number = loop.run(loop.tables, loop.guards[k], work, progress, *given, rule)
             if left == 0 or number == limits.iterations:
                 break
         number += 1
@@ -179,13 +198,27 @@ def newton(
     return Newton(*result)
 
 
-def _loop_of(equations: Steps, work: tuple[np.ndarray, ...]) -> CompiledNewton | None:
-    """The compiled loop, if there is one that the lanes at work fit, and threads share no lanes."""
-    z, p = work[2:4]
-    loop = equations.compiled_newton if shares_of(len(z)) < 2 else None
+def _loop_of(equations: Steps, z: Lanes, p: Parameters) -> CompiledNewton | None:
+    """The compiled loop, if there is one that lanes fit."""
+    loop = equations.compiled_newton
     if loop is None or (z.shape[1], p.shape[1]) != loop.widths or is_awaited(loop.run):
         return None
     return loop
+
+
+def _shared(
+    equations: Steps, z: Lanes, p: Parameters, limits: Limits, through: Through | None, shares: int
+) -> Newton:
+    """The same by several threads, each of which takes its share of the lanes to the end."""
+    cuts = [len(z) * k // shares for k in range(shares + 1)]
+    parts = [np.arange(a, b) for a, b in pairwise(cuts)]
+    moved = [None if through is None else Through(*through.take(part)) for part in parts]
+    tasks = [
+        partial(newton, equations, z[part], p[part], limits.take(part), along)
+        for part, along in zip(parts, moved, strict=True)
+    ]
+    found = [tuple(vars(each).values()) for each in results_of(tasks)]
+    return Newton(*(np.concatenate(each) for each in zip(*found, strict=True)))
 
 
 def _step(equations: Steps, work: tuple[np.ndarray, ...], m: int) -> tuple[np.ndarray, ...]:

@@ -107,7 +107,7 @@ def correct_lanes(step, work, count, result, guards, weights, limits, longest, r
 
 
 def newton_of(step):
-    """Newton's method at fixed parameters as one loop, with the kernel of a structure's step.
+    """Newton's method as one loop, with the kernel of a structure's step.
 
     The kernel is as that of `marching.tick_kernels.march_of`.
     """
@@ -120,18 +120,19 @@ def newton_of(step):
         taken before; guard: least ratio of the pivots; rule: longest step, steps that need not
         shrink, and most steps.
         """
-        z, p = lanes[2], lanes[3]
+        z, p, dp, row, corner = lanes[2:]
         (left, number), (longest, free, most), (rows, size) = progress, rule, z.shape
-        still_z, still_p, none = np.zeros((rows, size)), np.zeros(p.shape), np.zeros(rows)
-        one, index = np.ones(rows), np.empty(rows, np.int64)
+        none, index = np.zeros(rows), np.empty(rows, np.int64)
+        if dp.shape[1] == 0:  # at fixed parameters
+            dp, row = np.zeros(p.shape), np.zeros((rows, size))
         dz, tangent_z = np.empty((rows, size)), np.empty((rows, size))
         dt, tangent_t, residual = np.empty(rows), np.empty(rows), np.empty(rows)
         determinant, ratio = np.empty((rows, 2)), np.empty(rows)
         while left > 0 and number < most:
             m = max(left, LANES)
             step(
-                work, tables, z[:m], p[:m], still_p, still_z, one, none, dz, dt, tangent_z,
-                tangent_t, residual, index, determinant, ratio,
+                work, tables, z[:m], p[:m], dp, row, corner, none, dz, dt, tangent_z, tangent_t,
+                residual, index, determinant, ratio,
             )  # fmt: skip
             if any_below(ratio, left, guard):
                 break

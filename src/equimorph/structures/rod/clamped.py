@@ -240,7 +240,8 @@ class ClampedMechanics(PlanarMechanics):
     @cached_property
     def compiled_newton(self) -> CompiledNewton:
         """The loop over the fused step."""
-        return CompiledNewton(newton_lanes, (self._step_data,), REFINABLE, (self.size, PARAMETERS))
+        guards, widths = (REFINABLE, PIVOT_GUARD), (self.size, PARAMETERS)
+        return CompiledNewton(newton_lanes, (self._step_data,), guards, widths)
 
     def compiled_steps(self, bounds: Bounds) -> CompiledSteps:
         """Loops over the fused step and the search for the largest curvature."""

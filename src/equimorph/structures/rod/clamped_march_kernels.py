@@ -71,6 +71,6 @@ def search_lanes(tables, bounds, problem, block, move, scratch, values, root):
 
 @njit(**FLAGS)
 def newton_lanes(tables, guard, lanes, progress, result, guards, weights, limits, rule):
-    """Correct guesses at fixed parameters; see `structures.newton_kernels.newton_of`."""
+    """Correct guesses; see `structures.newton_kernels.newton_of`."""
     work = (advance_work(tables[0][0]),)
     return _newton(work, tables, guard, lanes, progress, result, guards, weights, limits, rule)
