@@ -37,6 +37,8 @@ Scalars = Float[np.ndarray, "lanes scalars"]
 """Several scalars a lane."""
 Sides = Float[np.ndarray, "lanes sides bordered"]
 """Right-hand sides of bordered systems, several a lane."""
+Directions = Float[np.ndarray, "lanes k parameters"]
+"""Changes of the parameters along k directions."""
 Settings = Float[np.ndarray, "lanes 2"]
 """Two parameters a lane."""
 Frames = Float[np.ndarray, "lanes d full"]

@@ -5,7 +5,7 @@ import pytest
 
 import equimorph as em
 from equimorph.equilibria.critical_tests import cubic, gap, quadratic
-from equimorph.equilibria.newton_step import Problem
+from equimorph.equilibria.newton_step import STEEPEST, Problem, start_at
 from equimorph.equilibria.point_conditions import Crossing, Fold, Plane, Values, Vanishing
 from equimorph.equilibria.settle import (
     Guards,
@@ -314,3 +314,28 @@ def test_no_lanes_are_no_trouble():
     assert len(settle(form, *none).z) == 0
     directions = free_directions(form, np.array([0]), 0)
     assert len(settle(form, *none, directions, [Fold()]).found) == 0
+
+
+@pytest.mark.parametrize("in_planes", [False, True])
+@pytest.mark.parametrize("at_fold", [False, True])
+def test_steps_by_responses_are_those_of_the_bordered_system(in_planes, at_fold):
+    """Of the arch, and at its fold, where tangents over parameters are steep.
+
+    Bordered solves are regular there, too. 1e-9: tangents of up to 1e3 lose three digits.
+    """
+    arch, generator = em.Rod(load="uniform"), np.random.default_rng(5)
+    natural = arch.natural_state(Theta=0.9, Delta=0.02)
+    here = em.limit_load(natural, "q").state if at_fold else em.lift(natural, {"q": 2.0}).end
+    z = here.z + 1e-7 * generator.normal(size=(24, arch.size))
+    p, free = np.tile(here.p, (24, 1)), np.array([0, 2])
+    rows = generator.normal(size=(24, 2, arch.size)) / arch.size, np.zeros((24, 2, 4))
+    rows[1][:, 0, 0] = rows[1][:, 1, 2] = 1.0
+    frame = Planes(*rows) if in_planes else Tangents()
+    points = start_at(Problem(arch, free_directions(arch, free, 24), (), frame), z, p)
+    found, exact = points.tangent(), points._bordered()
+    response = arch.respond(z, p, points.problem.directions)
+    assert ((np.abs(response.tangents).max(axis=(1, 2)) > STEEPEST) == at_fold).all()
+    np.testing.assert_array_equal(found.index, exact.index)
+    np.testing.assert_array_equal(found.sure, exact.sure)
+    np.testing.assert_allclose(found.onto, exact.onto, rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(found.along, exact.along, rtol=1e-9, atol=1e-9)

@@ -176,6 +176,29 @@ def test_fused_step_equals_the_plain_route(specimen):
             np.testing.assert_allclose(getattr(fused, name), exact, rtol=1e-9, atol=bound)
 
 
+@every_whole_step
+@pytest.mark.parametrize("k", [1, 2, 3, 4])
+def test_response_is_the_step_at_fixed_parameters_with_tangents(specimen, k):
+    """Solves with −F and −F_p·d of each direction. 1e-10: conditioning of random states."""
+    structure = specimen.structure
+    for lanes in (1, 5, 8, 21):
+        z, p, _, dp = specimen.states(lanes)
+        directions = np.stack([dp, dp[::-1] - 0.3 * dp, 0.2 * dp[::-1], 2.0 * dp], axis=1)[:, :k]
+        found = structure.respond(z, p, directions)
+        system = structure.linear_system(z, p, directions)
+        rhs = -np.concatenate([system.residual[:, None], system.columns], axis=1)
+        exact = structure.solve(z, p, rhs)
+        np.testing.assert_array_equal(found.index, exact.negative - structure.constraints)
+        np.testing.assert_array_equal(found.index, structure.index(z, p))
+        steps = np.concatenate([found.dz[:, None], found.tangents], axis=1)
+        bound = 1e-10 * max(1.0, np.abs(exact.x).max())
+        np.testing.assert_allclose(steps, exact.x, rtol=1e-9, atol=bound)
+        row, one, none = np.zeros_like(z), np.ones(lanes), np.zeros(lanes)
+        step = structure.advance(z, p, dp, row, one, none)
+        told, known = (in_units(each.determinant, 0.0) for each in (found, step))
+        np.testing.assert_allclose(told, known, rtol=1e-10)
+
+
 @every_structure
 @pytest.mark.parametrize("k", [0, 1, 2])
 def test_linear_system_is_what_its_parts_are(specimen, k):

@@ -50,7 +50,9 @@ def test_threads_that_share_lanes_take_the_same_steps(moving):
     rod, generator, lanes = em.Rod(load="uniform"), np.random.default_rng(3), 1700
     p = np.tile([1.0, 0.1, 2.5, np.sin(1.0)], (lanes, 1))
     z = rod.sample(p, generator)
-    limits = replace(LIMITS, too_long=generator.uniform(1.0, 5.0, lanes), exempt=np.arange(lanes) % 3)
+    limits = replace(
+        LIMITS, too_long=generator.uniform(1.0, 5.0, lanes), exempt=np.arange(lanes) % 3
+    )
     through = plane(z, p) if moving else None
     em.set_threads(1)
     alone = newton(rod, z, p, limits, through)

@@ -4,11 +4,11 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from equimorph.arrays import Int, Lanes, Parameters, Values
+from equimorph.arrays import Directions, Int, Lanes, Parameters, Values
 from equimorph.equilibria.critical import Critical, Test
 from equimorph.equilibria.lift import check_start
 from equimorph.equilibria.locus_events import Watch
-from equimorph.equilibria.point_conditions import Directions, Vanishing
+from equimorph.equilibria.point_conditions import Vanishing
 from equimorph.equilibria.settle import Guards, Settled, settle
 from equimorph.equilibria.trace_options import EventKind
 from equimorph.errors import InputError

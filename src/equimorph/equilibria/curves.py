@@ -6,7 +6,7 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 
-from equimorph.arrays import Float, Lanes, Numbers, Parameters, Some, Values
+from equimorph.arrays import Directions, Float, Lanes, Numbers, Parameters, Some, Values
 from equimorph.linalg import Border, BorderedSolution
 from equimorph.marching.kernels import squared_lengths
 from equimorph.structures import Advance, Direction, Equations, LinearSystem, Structure
@@ -261,9 +261,7 @@ class AlongCurve(Equations):
         here, t = self._at(p)
         return here.structure.solve(*here.states(z, t), rhs, border, shift)
 
-    def linear_system(
-        self, z: Lanes, p: Parameters, directions: Float[np.ndarray, "lanes k parameters"]
-    ) -> LinearSystem:
+    def linear_system(self, z: Lanes, p: Parameters, directions: Directions) -> LinearSystem:
         """F, F_t along changes of t, and solves with F_z."""
         (here, t), dt = self._at(p), directions[:, :, :1]
         system = here.structure.linear_system(*here.states(z, t), dt * here.rate(t)[:, None])

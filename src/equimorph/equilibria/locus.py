@@ -5,11 +5,11 @@ from functools import cached_property
 
 import numpy as np
 
-from equimorph.arrays import Flags, Float, Int, Lanes, Numbers, Parameters, Values
+from equimorph.arrays import Directions, Flags, Float, Int, Lanes, Numbers, Parameters, Values
 from equimorph.columns import Columns
 from equimorph.equilibria.critical import Critical, Test, null_border
 from equimorph.equilibria.newton_step import Planes, Tangents
-from equimorph.equilibria.point_conditions import Condition, Directions, Move, Plane, Vanishing
+from equimorph.equilibria.point_conditions import Condition, Move, Plane, Vanishing
 from equimorph.equilibria.settle import Guards, Settled, free_directions, settle
 from equimorph.structures import Structure
 

@@ -110,3 +110,48 @@ def null_lanes(x, size, k, b, null):
             for n in range(size):
                 null[lane, n] += share * x[lane, at, n]
             null[lane, size] += share * beta
+
+
+@njit(**FLAGS)
+def along_lanes(step, tangents, rows, x, steepness):
+    """Directions along the set that rows see as unit vectors, and the step that they do not see.
+
+    From a step (lanes, size) at fixed parameters, tangents (lanes, k, size), and rows (lanes, k,
+    size + k): x (lanes, k + 1, size + k), the step last; steepness: largest entry of tangents, not
+    a number where one is not.
+    """
+    k, size = tangents.shape[1:]
+    seen = np.empty((k, 2 * k))
+    for lane in range(step.shape[0]):
+        largest, total = 0.0, 0.0
+        for i in range(k):
+            for n in range(size):
+                entry = abs(tangents[lane, i, n])
+                largest, total = max(largest, entry), total + entry
+        steepness[lane] = largest if total < np.inf else np.nan
+        # Σⱼ cⱼ tangentⱼ, seen by row i, is entry (i, ·) times c
+        for i in range(k):
+            for j in range(k):
+                value = rows[lane, i, size + j]
+                for n in range(size):
+                    value += rows[lane, i, n] * tangents[lane, j, n]
+                seen[i, j], seen[i, k + j] = value, 1.0 if i == j else 0.0
+        solve_by_rows(seen, k)
+        for i in range(k):
+            for n in range(size):
+                x[lane, i, n] = 0.0
+            for j in range(k):
+                share = seen[j, k + i]
+                for n in range(size):
+                    x[lane, i, n] += share * tangents[lane, j, n]
+                x[lane, i, size + j] = share
+        for n in range(size):
+            x[lane, k, n] = step[lane, n]
+        for n in range(k):
+            x[lane, k, size + n] = 0.0
+        for i in range(k):
+            share = 0.0
+            for n in range(size):
+                share += rows[lane, i, n] * step[lane, n]
+            for n in range(size + k):
+                x[lane, k, n] -= share * x[lane, i, n]

@@ -4,16 +4,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from equimorph.arrays import Flags, Float, Int, Lanes, Numbers, Parameters, Some, Values
+from equimorph.arrays import Directions, Flags, Float, Int, Lanes, Numbers, Parameters, Some, Values
 from equimorph.columns import Columns
 from equimorph.equilibria.critical import Critical, null_border
-from equimorph.equilibria.newton_kernels import amount_lanes, move_lanes, null_lanes
-from equimorph.equilibria.point_conditions import Condition, Directions, Linear, Move
+from equimorph.equilibria.newton_kernels import along_lanes, amount_lanes, move_lanes, null_lanes
+from equimorph.equilibria.point_conditions import Condition, Linear, Move
 from equimorph.linalg import orthonormal_rows
 from equimorph.structures import Equations, LinearSystem, Structure
 
 DOUBTFUL = 1e-4
 """Pivot ratio below which the index is counted anew."""
+STEEPEST = 1e3
+"""Entry of a tangent, for changes of the parameters by their scales, from which on its space is
+found by a bordered solve: near folds tangents over the parameters lose as many digits."""
 RANK = 1e-12
 """Smallest singular value of slopes, relative to the largest one, that counts as zero; their
 determinant is `DEPENDENT` then."""
@@ -205,9 +208,51 @@ class Points(Columns):
     def tangent(self) -> Tangent:
         """Newton step onto the set where the rows vanish, and directions along the set."""
         problem, structure = self.problem, self.problem.structure
-        (lanes, size), width = self.z.shape, self.problem.width
-        if width == 0 or isinstance(problem.frame, Held):
+        if problem.width == 0 or isinstance(problem.frame, Held):
             return self._over_parameters()
+        alone = not (problem.conditions or problem.unfolded)
+        if alone and problem.width <= structure.fused_directions:
+            return self._by_response()
+        return self._bordered()
+
+    def _by_response(self) -> Tangent:
+        """The same from the step at fixed parameters and its tangents; bordered near folds."""
+        problem = self.problem
+        out = problem.structure.respond(self.z, self.p, problem.directions)
+        steepness = np.empty(len(self.z))
+        x = np.empty((len(self.z), problem.width + 1, self.rows.shape[2]))
+        along_lanes(out.dz, out.tangents, self.rows, x, steepness)
+        told = self._frame(x, out.index, out.ratio >= DOUBTFUL)
+        steep = np.flatnonzero(~(steepness < STEEPEST) | np.isnan(out.ratio))
+        if len(steep):
+            again = self.take(steep)._bordered()
+            for name in ("onto", "along", "index", "sure"):
+                getattr(told, name)[steep] = getattr(again, name)
+        return told
+
+    def _frame(
+        self,
+        x: Float[np.ndarray, "lanes columns bordered"],
+        index: Numbers,
+        sure: Flags,
+        system: LinearSystem | None = None,
+        null: Float[np.ndarray, "lanes extended"] | None = None,
+    ) -> Tangent:
+        """Directions along the set made orthonormal, and the step after them.
+
+        Planes keep the step in them; else it is the shortest, orthogonal to the directions.
+        """
+        problem, width = self.problem, self.problem.width
+        many = width + isinstance(problem.frame, Tangents)
+        weights = weights_of(problem.structure, x.shape[2])
+        along = orthonormal_rows(x[:, :many], width, weights)
+        onto = np.ascontiguousarray(along[:, width] if many > width else x[:, width])
+        return Tangent(onto, along[:, :width], index, sure, system, null)
+
+    def _bordered(self) -> Tangent:
+        """The same by the bordered system, which is regular at folds."""
+        problem, structure = self.problem, self.problem.structure
+        (lanes, size), width = self.z.shape, self.problem.width
         system = structure.linear_system(self.z, self.p, problem.directions)
         columns, k = system.columns, system.columns.shape[1]
         seeks = problem.critical and not problem.unfolded  # (v, g) needs one solution more
@@ -226,28 +271,21 @@ class Points(Columns):
             null_lanes(x, size, k, self.b, null)
         index = solution.negative - structure.constraints
         sure = ~solution.pivoted & (solution.pivot_ratio >= DOUBTFUL)
-        # planes keep the step in them; else it is the shortest, orthogonal to the directions
-        many = width + isinstance(problem.frame, Tangents)
-        along = orthonormal_rows(x[:, :many], width, weights_of(structure, size + width))
-        onto = np.ascontiguousarray(along[:, width] if many > width else x[:, width])
-        return Tangent(onto, along[:, :width], index, sure, system, null)
+        return self._frame(x, index, sure, system, null)
 
     def _over_parameters(self) -> Tangent:
         """The same where parameters are the coordinates: the structure's fused steps."""
-        (lanes, size), k = self.z.shape, self.problem.width
-        rounds = max(k, 1)  # one call for all directions: calls cost more than lanes
-        still, many = np.zeros((rounds * lanes, size)), rounds * lanes
-        z, p = (np.concatenate([each] * rounds) for each in (self.z, self.p))
-        dp = (
-            np.concatenate([*self.problem.directions.transpose(1, 0, 2)]) if k else np.zeros_like(p)
-        )
-        move = self.problem.structure.advance(z, p, dp, still, np.ones(many), np.zeros(many))
+        (lanes, size), k, structure = self.z.shape, self.problem.width, self.problem.structure
         along, onto = np.zeros((lanes, k, size + k)), np.zeros((lanes, size + k))
-        onto[:, :size] = move.dz[:lanes]
         if k:
-            along[:, :, :size] = move.tangent_z.reshape(k, lanes, size).transpose(1, 0, 2)
-            along[:, :, size:] = np.eye(k)
-        return Tangent(onto, along, move.index[:lanes], np.ones(lanes, bool))
+            out = structure.respond(self.z, self.p, self.problem.directions)
+            onto[:, :size], index = out.dz, out.index
+            along[:, :, :size], along[:, :, size:] = out.tangents, np.eye(k)
+        else:
+            still, one, none = np.zeros_like(self.z), np.ones(lanes), np.zeros(lanes)
+            move = structure.advance(self.z, self.p, np.zeros_like(self.p), still, one, none)
+            onto[:, :size], index = move.dz, move.index
+        return Tangent(onto, along, index, np.ones(lanes, bool))
 
 
 def start_at(problem: Problem, z: Lanes, p: Parameters) -> Points:

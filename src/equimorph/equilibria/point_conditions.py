@@ -12,13 +12,11 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 
-from equimorph.arrays import Float, Lanes, Parameters, Scalars, Some
+from equimorph.arrays import Directions, Float, Lanes, Parameters, Scalars, Some
 from equimorph.columns import Columns
 from equimorph.equilibria.critical import Critical, Test
 from equimorph.model.descriptor import Evaluate
 from equimorph.structures.equations import Direction
-
-Directions = Float[np.ndarray, "lanes k parameters"]
 
 VALUE_DIFFERENCE, TEST_DIFFERENCE = 1e-5, 1e-5
 """Steps of differences, in the metric: they set the rate of convergence, not the error."""
@@ -31,7 +29,7 @@ class Move:
     onto_z: Lanes
     onto_p: Parameters
     along_z: Float[np.ndarray, "lanes k size"]
-    along_p: Float[np.ndarray, "lanes k parameters"]
+    along_p: Directions
 
     @property
     def along(self) -> list[Direction]:

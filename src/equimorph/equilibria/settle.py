@@ -14,7 +14,18 @@ from enum import IntEnum
 
 import numpy as np
 
-from equimorph.arrays import Flags, Float, Int, Lanes, Numbers, Parameters, Rows, Some, Values
+from equimorph.arrays import (
+    Directions,
+    Flags,
+    Float,
+    Int,
+    Lanes,
+    Numbers,
+    Parameters,
+    Rows,
+    Some,
+    Values,
+)
 from equimorph.equilibria.newton_kernels import judge_lanes
 from equimorph.equilibria.newton_step import (
     Frame,
@@ -29,7 +40,7 @@ from equimorph.equilibria.newton_step import (
     start_at,
     weights_of,
 )
-from equimorph.equilibria.point_conditions import Condition, Directions
+from equimorph.equilibria.point_conditions import Condition
 from equimorph.model import Constraint
 from equimorph.structures import Equations, Structure, newton_kernels
 from equimorph.structures.newton import Limits, Newton, Through, newton

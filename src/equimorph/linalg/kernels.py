@@ -22,6 +22,8 @@ INNER = {**FLAGS, "_nrt": False}
 They need not count references to their arrays: atomic operations that, element by element, cost as
 much as the arithmetic.
 """
+SUMS = {"contract", "reassoc"}
+"""Freedom of kernels whose sums may be taken in any order, in vectors: the same on every call."""
 POWER, HUGE, TINY = 256.0, 2.0**256, 2.0**-256
 """Products of pivots beyond 2^±256 are divided by a power of two, which is counted."""
 

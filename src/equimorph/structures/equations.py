@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from equimorph.arrays import Determinants, Float, Int, Lanes, Parameters, Sides, Values
+from equimorph.arrays import Determinants, Directions, Float, Int, Lanes, Parameters, Sides, Values
 from equimorph.linalg import Border, BorderedSolution
 from equimorph.linalg.intervals import Interval
 
@@ -32,6 +32,21 @@ class Advance:
     residual: Values
     index: Int[np.ndarray, " lanes"]
     determinant: Determinants
+
+
+@dataclass(frozen=True)
+class Response:
+    """One Newton step dz at fixed parameters, and tangents: changes of z along directions.
+
+    index, determinant: those of F_z as in `Advance`; ratio: smallest over largest pivot, nan where
+    pivots are not trusted.
+    """
+
+    dz: Lanes
+    tangents: Float[np.ndarray, "lanes k size"]
+    index: Int[np.ndarray, " lanes"]
+    determinant: Determinants
+    ratio: Values
 
 
 @dataclass(frozen=True)
@@ -163,9 +178,7 @@ class Equations(ABC):
         nothing = np.zeros((len(z), 0, self.size))
         return self.solve(z, p, nothing).negative - self.constraints
 
-    def linear_system(
-        self, z: Lanes, p: Parameters, directions: Float[np.ndarray, "lanes k parameters"]
-    ) -> LinearSystem:
+    def linear_system(self, z: Lanes, p: Parameters, directions: Directions) -> LinearSystem:
         """F, F_p along directions, and solves with F_z, for several solves at the same points.
 
         Here each part is computed by its own method; a structure that computes parts together says
@@ -189,6 +202,20 @@ class Equations(ABC):
         """One Newton step along the curve with parameter velocity `dp`; see `Advance`."""
         system = self.linear_system(z, p, dp[:, None])
         return advance_by(system, row, corner, defect, self.constraints)
+
+    fused_directions: int = 0
+    """Most directions with which `respond` costs less than `linear_system` with its solves."""
+
+    def respond(self, z: Lanes, p: Parameters, directions: Directions) -> Response:
+        """One Newton step at fixed parameters, and the tangents along at least one direction."""
+        (lanes, k), size = directions.shape[:2], self.size
+        # one call for all directions: calls cost more than lanes
+        many, dp = k * lanes, directions.transpose(1, 0, 2).reshape(k * lanes, -1)
+        still, one, none = np.zeros((many, size)), np.ones(many), np.zeros(many)
+        out = self.advance(np.tile(z, (k, 1)), np.tile(p, (k, 1)), dp, still, one, none)
+        tangents = out.tangent_z.reshape(k, lanes, size).transpose(1, 0, 2)
+        told = out.index[:lanes], out.determinant[:lanes], np.full(lanes, np.nan)
+        return Response(out.dz[:lanes], np.ascontiguousarray(tangents), *told)
 
     def correction(self, z: Lanes, p: Parameters) -> Advance:
         """One Newton step at fixed parameters, without a tangent.
@@ -232,9 +259,7 @@ class JointEquations(Equations):
         """Solve with F_z − shift·mass, bordered."""
         return self.solver(self.parts(z, p), z, p, shift)(rhs, border)
 
-    def linear_system(
-        self, z: Lanes, p: Parameters, directions: Float[np.ndarray, "lanes k parameters"]
-    ) -> LinearSystem:
+    def linear_system(self, z: Lanes, p: Parameters, directions: Directions) -> LinearSystem:
         """F, F_p along directions, and solves with F_z; computed together."""
         changes = [np.ascontiguousarray(each) for each in directions.transpose(1, 0, 2)]
         first = changes[0] if changes else np.zeros_like(p)

@@ -3,20 +3,25 @@
 import numpy as np
 
 from equimorph.linalg.compiled import njit
+from equimorph.linalg.kernels import SUMS
 from equimorph.linalg.row_kernels import rows_with_room, with_room
 
+PART = np.int64(16)
+"""Terms of a sum that are added before it is compared."""
 
-@njit(nogil=True)
+
+@njit(nogil=True, fastmath=SUMS)
 def nearest_in_list(node, following, points, target, weights, reach):
     """Find the nearest point of a linked list, and its squared distance; −1 if none is in reach.
 
     Squared distances below `reach` count; `weights` are of the first squared differences.
     """
-    best, nearest = -1, reach
+    best, nearest, count = -1, reach, weights.shape[0]
     while node >= 0:
         distance = 0.0
-        for j in range(weights.shape[0]):
-            distance += weights[j] * (target[j] - points[node, j]) ** 2
+        for begin in range(0, count, PART):
+            for j in range(begin, min(begin + PART, count)):
+                distance += weights[j] * (target[j] - points[node, j]) ** 2
             if distance > nearest:
                 break
         if distance < nearest:

@@ -3,11 +3,12 @@
 import numpy as np
 
 from equimorph.linalg.compiled import njit
+from equimorph.linalg.kernels import SUMS
 from equimorph.linalg.row_kernels import rows_with_room, with_room
 from equimorph.manifold.geometry.kernels import nearest_in_list
 
 
-@njit(nogil=True)
+@njit(nogil=True, fastmath=SUMS)
 def match_rays(
     n, weights, scales, head, following, z, index, tangents, counted, longest, reach, cosine,
     points, targets, spans, guesses, lengths, partners,
@@ -27,19 +28,17 @@ def match_rays(
     at least.
     """
     size, d = z.shape[1], spans.shape[1]
+    step, other = np.empty(size), np.empty(size)
     for i in range(points.shape[0]):
-        here = points[i]
-        weight = 0.0
+        here, weight = points[i], 0.0
         for k in range(d):
             weight += (spans[i, k] / scales[k]) ** 2
-        for j in range(size):
-            step = 0.0
-            for k in range(d):
-                step += tangents[here, k, j] * spans[i, k]
-            guesses[i, j] = z[here, j] + step
+        _step_along(tangents, here, spans, i, step)
         length = weight
         for j in range(n):
-            length += weights[j] * (guesses[i, j] - z[here, j]) ** 2
+            length += weights[j] * step[j] * step[j]
+        for j in range(size):
+            guesses[i, j] = z[here, j] + step[j]
         lengths[i] = length**0.5
         partners[i] = -2
         if not lengths[i] < longest or counted[here] != index[here]:
@@ -50,17 +49,25 @@ def match_rays(
         )
         if best < 0 or index[best] != index[here] or counted[best] != index[here]:
             continue
-        back, product, other = 0.0, weight, weight
+        _step_along(tangents, best, spans, i, other)
+        back, product, there = 0.0, weight, weight
         for j in range(size):
-            step = 0.0
-            for k in range(d):
-                step += tangents[best, k, j] * spans[i, k]
-            back += weights[j] * (z[best, j] - step - z[here, j]) ** 2
-            if j < n:
-                other += weights[j] * step * step
-                product += weights[j] * step * (guesses[i, j] - z[here, j])
-        if back < reach**2 * other and product >= cosine * (length * other) ** 0.5:
+            back += weights[j] * (z[best, j] - other[j] - z[here, j]) ** 2
+        for j in range(n):
+            there += weights[j] * other[j] * other[j]
+            product += weights[j] * other[j] * step[j]
+        if back < reach**2 * there and product >= cosine * (length * there) ** 0.5:
             partners[i] = best
+
+
+@njit(nogil=True, fastmath=SUMS)
+def _step_along(tangents, point, spans, i, step):
+    """Change of z along tangents of a point, for a change of the free parameters."""
+    for j in range(step.shape[0]):
+        step[j] = spans[i, 0] * tangents[point, 0, j]
+    for k in range(1, spans.shape[1]):
+        for j in range(step.shape[0]):
+            step[j] += spans[i, k] * tangents[point, k, j]
 
 
 @njit(nogil=True)

@@ -60,20 +60,16 @@ class Slopes:
         if len(new) == 0:
             return
         z, p = points.z[new], points.p[new]
-        still, one, none = np.zeros_like(z), np.ones(len(z)), np.zeros(len(z))
-        for k, place in enumerate(setting.free.tolist()):
-            along = np.zeros_like(p)
-            along[:, place] = 1.0
-            out = setting.structure.advance(z, p, along, still, one, none)
-            self.tangents[new, k] = out.tangent_z
-            if k == 0:  # and one more step of Newton's method
-                if self.unit is None:
-                    self.unit = float(np.median(out.determinant[:, 1]))
-                self.index[new] = out.index
-                self.determinant[new] = in_units(out.determinant, self.unit)
-                largest = np.abs(out.dz).max(axis=1)
-                near = (largest > LAST[0]) & (largest < LAST[1])
-                points.z[new[near]] += out.dz[near]
+        directions = np.zeros((len(new), len(setting.free), p.shape[1]))
+        directions[:, np.arange(len(setting.free)), setting.free] = 1.0
+        out = setting.structure.respond(z, p, directions)
+        if self.unit is None:
+            self.unit = float(np.median(out.determinant[:, 1]))
+        self.tangents[new], self.index[new] = out.tangents, out.index
+        self.determinant[new] = in_units(out.determinant, self.unit)
+        largest = np.abs(out.dz).max(axis=1)
+        near = (largest > LAST[0]) & (largest < LAST[1])
+        points.z[new[near]] += out.dz[near]
 
     def _reserve(self, capacity: int) -> None:
         """Make room for as many points as there may be."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from equimorph.argument_checks import check_arguments
 from equimorph.argument_vocabulary import SHARE
-from equimorph.arrays import Flags, Float, Int, Lanes, Parameters, Sides, Values
+from equimorph.arrays import Directions, Flags, Float, Int, Lanes, Parameters, Sides, Values
 from equimorph.errors import InputError
 from equimorph.linalg import BorderedSolution
 from equimorph.linalg.intervals import Interval
@@ -22,6 +22,7 @@ from equimorph.structures.equations import (
     Direction,
     Enclosed,
     LinearSystem,
+    Response,
     Shift,
 )  # fmt: skip
 from equimorph.structures.resolution import Refinable
@@ -136,16 +137,15 @@ class AnyRod(HeavyRod, Refinable):
         system = unit_system(units)
         self.space_options = options.check(EI, length)
         self.units = options.units(EI, length, system, mass)
-        given = {"EI": EI, "length": length, **lengths}
-        system.check_all_have_units(options.quantities | given)
+        system.check_all_have_units(options.quantities | {"EI": EI, "length": length, **lengths})
 
     def _use_mechanics(self, mechanics: RodMechanics) -> None:
         """Set the mechanics, and what the contract of structures asks of them."""
         self.mechanics = mechanics
         self.unknowns, self.constraints = mechanics.unknowns, mechanics.constraints
-        self.mass, self.length_unit = mechanics.mass, self.units.label("length")
+        self.mass, self.fused_directions = mechanics.mass, mechanics.fused_directions
+        self.length_unit, self.energy_unit = self.units.label("length"), self.units.energy_label
         self.energy_scale = self.units.value("couple")
-        self.energy_unit = self.units.energy_label
 
     def _complete_identity(
         self, data: dict[str, Any], resolution: tuple[int, int]
@@ -188,9 +188,7 @@ class AnyRod(HeavyRod, Refinable):
         """Solve with F_z − shift·mass, bordered."""
         return self.mechanics.solve(z, p, rhs, border, shift)
 
-    def linear_system(
-        self, z: Lanes, p: Parameters, directions: Float[np.ndarray, "lanes k parameters"]
-    ) -> LinearSystem:
+    def linear_system(self, z: Lanes, p: Parameters, directions: Directions) -> LinearSystem:
         """F, F_p along directions, and solves with F_z; computed together."""
         return self.mechanics.linear_system(z, p, directions)
 
@@ -199,6 +197,10 @@ class AnyRod(HeavyRod, Refinable):
     ) -> Advance:
         """One Newton step, with tangent and inertia."""
         return self.mechanics.advance(z, p, dp, row, corner, defect)
+
+    def respond(self, z: Lanes, p: Parameters, directions: Directions) -> Response:
+        """One Newton step, with tangents along directions."""
+        return self.mechanics.respond(z, p, directions)
 
     def correction(self, z: Lanes, p: Parameters) -> Advance:
         """One Newton step at fixed parameters."""

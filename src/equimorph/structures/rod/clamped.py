@@ -5,13 +5,21 @@ Fields are recovered to the accuracy that they have at vertices.
 See docs/decisions.md, "Kernels of the rod" and "Two mechanics of rods stay".
 """
 
-from dataclasses import dataclass
 from functools import cached_property, partial
 
 import numpy as np
-from numpy.polynomial import legendre, polynomial
 
-from equimorph.arrays import Float, Lanes, Nodal, Parameters, Sides, Values, Velocity
+from equimorph.arrays import (
+    Directions,
+    Float,
+    Int,
+    Lanes,
+    Nodal,
+    Parameters,
+    Sides,
+    Values,
+    Velocity,
+)
 from equimorph.linalg import BorderedSolution, CondensedLayout, no_border
 from equimorph.linalg.condensed import PIVOT_GUARD, REFINABLE
 from equimorph.linalg.lanes import over_lanes
@@ -22,6 +30,7 @@ from equimorph.structures.equations import (
     CompiledNewton,
     Direction,
     LinearSystem,
+    Response,
     Shift,
 )
 from equimorph.structures.rod.clamped_derivative_kernels import (
@@ -32,10 +41,11 @@ from equimorph.structures.rod.clamped_derivative_kernels import (
     residual_lanes,
     second_lanes,
 )
-from equimorph.structures.rod.clamped_field_kernels import fields_lanes, largest_lanes
+from equimorph.structures.rod.clamped_fields import ClampedFields
 from equimorph.structures.rod.clamped_kernels import advance_lanes
 from equimorph.structures.rod.clamped_march_kernels import march_lanes, newton_lanes, search_lanes
-from equimorph.structures.rod.discretisation import Mesh, reference_element
+from equimorph.structures.rod.clamped_response_kernels import MOST, respond_lanes
+from equimorph.structures.rod.discretisation import Mesh
 from equimorph.structures.rod.inertia import (
     inextensible_force,
     inextensible_inertia,
@@ -48,12 +58,6 @@ from equimorph.structures.rod.units import FOUR_PI_SQUARED
 
 PARAMETERS = 4
 """Number of parameters: Θ, Δ, q, ν."""
-LOAD_DEGREE = 16
-"""Degree of the polynomials by which the load is represented inside an element."""
-NEGLIGIBLE = 1e-13
-"""Legendre coefficients of ρ that are smaller, relative to the largest |ρ|, are round-off."""
-KEPT = 256
-"""Arclengths whose places in the mesh are kept: descriptors ask for the same one many times."""
 
 
 class ClampedMechanics(PlanarMechanics):
@@ -199,9 +203,7 @@ class ClampedMechanics(PlanarMechanics):
         """Solve with F_z − shift·mass, bordered."""
         return self._solve(*self.kkt(z, p, shift), rhs, border)
 
-    def linear_system(
-        self, z: Lanes, p: Parameters, directions: Float[np.ndarray, "lanes k parameters"]
-    ) -> LinearSystem:
+    def linear_system(self, z: Lanes, p: Parameters, directions: Directions) -> LinearSystem:
         """One kernel for F, F_p along directions and the matrix."""
         z, p = self.check_widths((z, p))
         (lanes, k, _), nodes = directions.shape, self.unknowns + 2
@@ -236,6 +238,37 @@ class ClampedMechanics(PlanarMechanics):
         rest = np.zeros_like(p), np.zeros_like(z), np.ones(len(z)), np.zeros(len(z))
         found = self.fused_step(advance_lanes, self._step_data, z, p, *rest)
         return self.pivot_steps(*found, z, p, *rest, guard=REFINABLE)
+
+    fused_directions = MOST
+
+    def respond(self, z: Lanes, p: Parameters, directions: Directions) -> Response:
+        """One fused kernel; lanes with an unsafe pivot take the general solve."""
+        if directions.shape[1] > MOST:
+            return super().respond(z, p, directions)
+        out = self._fused_response(z, p, directions)
+        unsafe = np.flatnonzero(~(out.ratio >= PIVOT_GUARD))
+        if len(unsafe):
+            again = super().respond(z[unsafe], p[unsafe], directions[unsafe])
+            for name, column in vars(again).items():
+                getattr(out, name)[unsafe] = column
+        return out
+
+    def index(self, z: Lanes, p: Parameters) -> Int[np.ndarray, " lanes"]:
+        """Negative eigenvalues of the constrained Hessian, as the fused kernel counts them."""
+        out = self._fused_response(z, p, np.zeros((len(z), 0, PARAMETERS)))
+        unsafe = np.flatnonzero(~(out.ratio >= PIVOT_GUARD))
+        if len(unsafe):
+            out.index[unsafe] = super().index(z[unsafe], p[unsafe])
+        return out.index
+
+    def _fused_response(self, z: Lanes, p: Parameters, directions: Directions) -> Response:
+        (z, p), (lanes, k) = self.check_widths((z, p)), directions.shape[:2]
+        dz, tangents = np.empty_like(z), np.empty((lanes, k, self.size))
+        index, determinant, ratio = np.empty(lanes, int), np.empty((lanes, 2)), np.empty(lanes)
+        out = (dz, tangents, index, determinant, ratio)
+        given = [z, p, np.ascontiguousarray(directions)]
+        over_lanes(respond_lanes, self._step_data, given, out)
+        return Response(*out)
 
     @cached_property
     def compiled_newton(self) -> CompiledNewton:
@@ -287,112 +320,3 @@ class ClampedMechanics(PlanarMechanics):
         image[:, :n] = -z[:, :n][:, ::-1]
         image[:, -1] = p[:, 2] * total - z[:, -1]
         return image, p * np.array([1.0, -1.0, 1.0, 1.0])
-
-
-@dataclass(frozen=True, eq=False)
-class ClampedFields:
-    """Fields anywhere on the rod as accurate as at its vertices: errors of order 2N for degree N.
-
-    θ and the moments are superconvergent at the vertices, λ and μ everywhere; inside an element θ
-    of degree N is less accurate. So the equilibrium equation is integrated from the nearest vertex,
-    as an initial value problem, by Taylor series of order 16.
-
-    References
-    ----------
-    Vertices: [DouglasDupont1974]_.
-    """
-
-    mesh: Mesh
-    load: LoadShape
-    stiffness: Float[np.ndarray, "elements order order"]
-    """Element stiffness over 4π²."""
-    rho: Float[np.ndarray, "elements order"]
-
-    def fields(
-        self, z: Lanes, p: Parameters, s: Float[np.ndarray, " points"]
-    ) -> Float[np.ndarray, "lanes points 4"]:
-        """(θ, κ, x, y) at arclengths."""
-        element, side, distance = self._nearest_vertices(s)
-        out = np.empty((len(z), 4 * len(s)))
-        shared = (
-            self.stiffness,
-            self._pressures,
-            self.mesh.element_weights,
-            self._nodal_rho,
-            self._rises,
-            element,
-            side,
-            distance,
-        )
-        over_lanes(fields_lanes, shared, [z, p], [out])
-        return out.reshape(len(z), len(s), 4)
-
-    def _nearest_vertices(self, s: Float[np.ndarray, " points"]) -> tuple[np.ndarray, ...]:
-        """Elements, on which side of them the nearest vertices are, and the ways from these."""
-        known, key = self._vertices, s.tobytes()
-        found = known.get(key)
-        if found is None:
-            element, t = self.mesh.locate(s)
-            side = (t > 0.5).astype(np.int64)
-            found = element, side, s - self.mesh.breaks[element + side]
-            if len(s) == 1 and len(known) < KEPT:
-                known[key] = found
-        return found
-
-    @cached_property
-    def _vertices(self) -> dict[bytes, tuple[np.ndarray, ...]]:
-        """What `_nearest_vertices` keeps."""
-        return {}
-
-    def largest_curvature(self, z: Lanes, p: Parameters) -> tuple[Values, Values]:
-        """max_s |κ(s)|, ends and interior extrema included, and the first arclength where it is."""
-        out, place = np.empty(len(z)), np.empty(len(z))
-        over_lanes(largest_lanes, self.extremum_data, [z, p], [out, place])
-        return out, place
-
-    @cached_property
-    def extremum_data(self) -> tuple[np.ndarray, ...]:
-        """What the search for the largest curvature shares among lanes."""
-        ref = self.mesh.reference
-        return (
-            self.stiffness,
-            self._pressures,
-            self.mesh.breaks,
-            ref.nodes,
-            ref.integral,
-            self._nodal_rho,
-            self._rises,
-        )
-
-    @cached_property
-    def _pressures(self) -> Float[np.ndarray, " elements"]:
-        """Quadrature weight of a vertex in each element."""
-        return np.ascontiguousarray(self.mesh.element_weights[:, 0])
-
-    @cached_property
-    def _nodal_rho(self) -> Float[np.ndarray, " nodes"]:
-        """ρ, which is continuous, node by node."""
-        return np.append(self.rho[:, :-1].ravel(), self.rho[-1, -1])
-
-    @cached_property
-    def _rises(self) -> Float[np.ndarray, "elements 2 terms"]:
-        """Taylor coefficients of ρ about the left and the right vertex of each element.
-
-        ρ is taken as a polynomial of degree 16 in each element, less its round-off: of degree 2
-        under tables.
-        """
-        fine = Mesh(self.mesh.breaks, reference_element(LOAD_DEGREE))
-        rho = self.load.cumulate(fine)
-        series = rho @ fine.reference.to_legendre.T
-        large = np.abs(series).max(axis=0) > NEGLIGIBLE * max(np.abs(rho).max(), 1e-300)
-        terms = int(np.flatnonzero(large).max(initial=0)) + 1
-        out = np.empty((self.mesh.elements, 2, terms))
-        for e, length in enumerate(self.mesh.lengths):
-            powers = legendre.leg2poly(series[e, :terms])  # in x = −1 … 1
-            for side, centre in enumerate((-1.0, 1.0)):
-                scale = 1.0
-                for k in range(terms):
-                    at = polynomial.polyval(centre, polynomial.polyder(powers, k))
-                    out[e, side, k] = at * scale
-                    scale *= 2.0 / (length * (k + 1))
-        return out

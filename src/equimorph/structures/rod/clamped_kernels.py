@@ -160,21 +160,24 @@ def _subtract_stiffness(halves, e, order, theta, columns, pairs, sums):
 
 
 @njit(**INNER)
-def _add_end(stiffness, e, end, velocity, columns, sums):
-    """Part of F_p·dp by the velocity of a prescribed end of element `e`: 0 left, 1 right."""
+def add_end(stiffness, e, end, velocity, slot, close, columns, sums):
+    """Part of F_p·dp by the velocity of a prescribed end of element `e`: 0 left, 1 right.
+
+    To the slot of a column, and to the sums of its constraints from row `close` on.
+    """
     order = stiffness.shape[1]
     base = e * (order - 1) * TILE
     for i in range(order):
-        at = base + i * TILE + COLUMN
+        at = base + i * TILE + slot
         factor = spread(stiffness[e, i, end * (order - 1)])
         store(columns, at, load(columns, at) + factor * velocity)
     at = base + end * (order - 1) * TILE
-    store(sums, CLOSE_ALONG, load(sums, CLOSE_ALONG) + load(columns, at + FIRST) * velocity)
-    store(sums, CLOSE_ACROSS, load(sums, CLOSE_ACROSS) + load(columns, at + SECOND) * velocity)
+    store(sums, close, load(sums, close) + load(columns, at + FIRST) * velocity)
+    store(sums, close + 1, load(sums, close + 1) + load(columns, at + SECOND) * velocity)
 
 
 @njit(**INNER)
-def _assemble_group(
+def assemble_group(
     stiffness, halves, group, weights, loads, theta, scalars, closing_row, closing,
     diagonal, columns, pairs, sums,
 ):  # fmt: skip
@@ -187,13 +190,14 @@ def _assemble_group(
     for e in range(begin, end):
         _subtract_stiffness(halves, e, degree + 1, theta, columns, pairs, sums)
     if begin == 0:
-        _add_end(stiffness, 0, 0, load(closing, START), columns, sums)
+        add_end(stiffness, 0, 0, load(closing, START), COLUMN, CLOSE_ALONG, columns, sums)
     if end == elements:
-        _add_end(stiffness, elements - 1, 1, load(closing, STOP), columns, sums)
+        velocity = load(closing, STOP)
+        add_end(stiffness, elements - 1, 1, velocity, COLUMN, CLOSE_ALONG, columns, sums)
 
 
 @njit(**INNER)
-def _start_sums(scalars, closing, sums, products):
+def start_sums(scalars, closing, sums, products):
     """Reset the sums over nodes of a block."""
     zero = spread(0.0)
     store(sums, ALONG, zero - load(scalars, NU))
@@ -296,9 +300,9 @@ def advance_in(
         start = min(block, lanes - LANES)
         read_state(z, p, start, n, theta, scalars)
         _read_closing(dp, row, corner, defect, start, n, closing_row, closing)
-        _start_sums(scalars, closing, sums, products)
+        start_sums(scalars, closing, sums, products)
         for group in range((elements + GROUP - 1) // GROUP):
-            _assemble_group(
+            assemble_group(
                 stiffness, halves, group, weights, loads, theta, scalars, closing_row, closing,
                 diagonal, columns, pairs, sums,
             )  # fmt: skip
