@@ -325,7 +325,7 @@ def test_steps_by_responses_are_those_of_the_bordered_system(in_planes, at_fold)
     """
     arch, generator = em.Rod(load="uniform"), np.random.default_rng(5)
     natural = arch.natural_state(Theta=0.9, Delta=0.02)
-    here = em.limit_load(natural, "q").state if at_fold else em.lift(natural, {"q": 2.0}).end
+    here = em.limit_load(natural, "q").state if at_fold else em.lift(natural, {"q": 2.0}).end.state
     z = here.z + 1e-7 * generator.normal(size=(24, arch.size))
     p, free = np.tile(here.p, (24, 1)), np.array([0, 2])
     rows = generator.normal(size=(24, 2, arch.size)) / arch.size, np.zeros((24, 2, 4))
