@@ -24,6 +24,7 @@ from equimorph.manifold.lifting.grid import (
     grid_mesh,
     longest_edges,
 )
+from equimorph.manifold.lifting.layers import find_through_layers
 from equimorph.manifold.lifting.pairing import Pairing, start_pairing
 from equimorph.manifold.lifting.seeds import Seeds, is_symmetric, seeds
 from equimorph.manifold.lifting.strips import strips_astray
@@ -306,7 +307,8 @@ class _Lifting:
         pairing, progress = self.pairing, self.order.progress
         flood_crossings(pairing, progress, tiles.flood if tiles else flood)
         progress.report("closing loops", 0, 1)
-        return self.finder.find(pairing, partial(tiles.close, progress=progress) if tiles else None)
+        close = partial(tiles.close, progress=progress) if tiles else None
+        return find_through_layers(self.finder, pairing, close, progress)
 
     def with_checks(
         self, cells: Cells, eset: EquilibriumSet, found: Check, recovered: int

@@ -22,13 +22,12 @@ from equimorph.manifold.lifting.discs import Discs
 from equimorph.manifold.lifting.pairing import Pairing
 from equimorph.manifold.lifting.spheres import (
     Parts,
-    Surfaces,
     closed_surfaces,
     fans_of,
-    find_spheres,
     part,
     upright_apexes,
 )
+from equimorph.manifold.lifting.surfaces import Surfaces, find_spheres
 
 SHARES = (0.25, 0.5, 0.8, 0.95)
 """Fractions between centroid and member used as retry starting points. Of 10 600 points inside
@@ -128,7 +127,7 @@ def fill(pairing: Pairing, discs: Discs, wanted: Bool[np.ndarray, " N"]) -> Ball
     doubtful = np.zeros(len(pairing.mesh.tetrahedra), bool)
     doubtful[spheres.doubtful] = True
     caps, lost = _caps(pairing, spheres.others)
-    doubtful[spheres.others.owner[lost]] = True
+    doubtful[spheres.others.owner[spheres.others.rim_surface[lost]]] = True
     crossing = pairing.points.kind == VertexKind.CROSSING
     closed = closed_surfaces(spheres.others, caps, ~doubtful[spheres.others.owner], crossing)
     parts = part(closed, _marks(pairing.points))
@@ -170,15 +169,15 @@ def _large(mesh: BaseMesh) -> Bool[np.ndarray, " N"]:
 
 def _caps(
     pairing: Pairing, surfaces: Surfaces
-) -> tuple[Int[np.ndarray, " S"], Bool[np.ndarray, " S"]]:
-    """Points on the constraint from which open surfaces are closed, and where one is missing.
+) -> tuple[Int[np.ndarray, " rims"], Bool[np.ndarray, " rims"]]:
+    """Points on the constraint from which rims are closed, and where one is missing.
 
     −1 where none is needed: a rim of three points can be closed by their triangle.
     """
-    count = len(surfaces.owner)
-    amount = np.bincount(surfaces.surface, minlength=count)
-    around = np.bincount(surfaces.rim_surface, minlength=count)
-    at, points = _group(surfaces.rim_surface, surfaces.rims, _marks(pairing.points))
+    count, owner = len(surfaces.rim_surface), surfaces.owner[surfaces.rim_surface]
+    amount = np.bincount(surfaces.surface, minlength=len(surfaces.owner))[surfaces.rim_surface]
+    around = np.bincount(surfaces.rim, minlength=count)
+    at, points = _group(surfaces.rim, surfaces.sides, _marks(pairing.points))
     ends = {
         kind: pairing.points.kind[points] == kind
         for kind in (VertexKind.CORNER, VertexKind.CROSSING)
@@ -192,7 +191,7 @@ def _caps(
     for kind, own in (*singular.items(), (VertexKind.CAP, plain)):
         used = own[at] & ends.get(kind, np.True_)
         groups = _groups(at[used], points[used], np.flatnonzero(own))
-        caps[own] = _pin(pairing, groups, kind, surfaces.owner[own], cap=True)
+        caps[own] = _pin(pairing, groups, kind, owner[own], cap=True)
         lost |= own & (caps < 0) & ((kind != VertexKind.CAP) | (around > 3))
     return caps, lost
 
@@ -224,9 +223,8 @@ def _middles(
     """Exact point inside every curve: a fold, or a crossing; it can be on the constraint."""
     count = len(parts.curve_surface)
     at, points = _group(parts.curve, parts.folds, _marks(pairing.points))
-    cap = parts.closed.cap[parts.curve_surface]
     middles = np.full(count, -1)
-    own = points == cap[at]
+    own = np.isin(points, parts.closed.caps)
     middles[at[own]] = points[own]
     left = (middles < 0) & parts.whole[parts.curve_surface]
     for kind, own in ((VertexKind.FOLD, ~parts.curve_met), (VertexKind.CROSSING, parts.curve_met)):
@@ -248,7 +246,7 @@ def _apexes(
     """Apex of every region: on a fold, on the constraint, or near the centroid of its vertices."""
     count = len(parts.region_surface)
     folded = parts.first_curve >= 0
-    apexes: Int[np.ndarray, " regions"] = parts.closed.cap[parts.region_surface]
+    apexes: Int[np.ndarray, " regions"] = parts.region_cap.copy()
     apexes[folded] = middles[parts.first_curve[folded]]
     size = np.bincount(parts.region, minlength=count)
     four = np.flatnonzero(~folded & (apexes < 0) & (size == 4))

@@ -97,6 +97,8 @@ def _around(pairing: Pairing) -> Float[np.ndarray, "T 6"]:
     # sums of irrational shares differ for different sets of curves
     share = np.modf((live + 1) * np.sqrt(2.0))[0]
     of_edge = np.bincount(edge, share, len(mesh.edges)).astype(float)
+    for own, arcs in pairing.arcs.items():
+        of_edge[own] += len(arcs) * np.sqrt(3.0)
     vertex = points.vertex[: points.count]
     of_vertex = np.bincount(vertex[vertex >= 0], minlength=len(mesh.vertices))
     return np.concatenate([of_edge[mesh.sides], of_vertex[mesh.triangles]], axis=1)

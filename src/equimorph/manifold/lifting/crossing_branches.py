@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from equimorph.arrays import Float, Int, Items
+from equimorph.arrays import Float, Int, Items, Lanes, Parameters, Place, Values
 from equimorph.equilibria import ParameterLine, TraceOptions
 from equimorph.equilibria.critical import null_border
 from equimorph.equilibria.steps import Front, step_along
@@ -115,16 +115,36 @@ def _switch(pairing: Pairing, alone: Items) -> None:
 
 def _beyond(pairing: Pairing, alone: Int[np.ndarray, " crossings"]) -> Seeds:
     """Equilibria over vertices that the curves through crossings lead to."""
-    store, mesh, setting = pairing.points, pairing.mesh, pairing.setting
-    reached = []
-    ends = setting.parameters(mesh.vertices[mesh.edges[store.edge[alone]].ravel()])
-    ends = ends.reshape(len(alone), 2, -1)
-    line = ParameterLine(setting.structure, ends[:, 0].copy(), ends[:, 1] - ends[:, 0])
+    line = edge_lines(pairing, pairing.points.edge[alone])
     halves, front = _starts(pairing, alone, line)
     owner = halves // (CURVES * HALVES)
+    seeds, met, _ = lead_out(
+        pairing, halves, pairing.points.edge[alone[owner]], line.take(owner), front
+    )
+    _enter_arcs(pairing, alone, met)
+    return seeds
+
+
+def edge_lines(pairing: Pairing, edges: Items) -> ParameterLine:
+    """Grid edges in parameter space, from their first ends."""
+    setting, mesh = pairing.setting, pairing.mesh
+    ends = setting.parameters(mesh.vertices[mesh.edges[edges].ravel()]).reshape(len(edges), 2, -1)
+    return ParameterLine(setting.structure, ends[:, 0].copy(), ends[:, 1] - ends[:, 0])
+
+
+def lead_out(
+    pairing: Pairing, halves: Items, edges: Items, line: ParameterLine, front: Front
+) -> tuple[Seeds, Inside, dict[int, Place]]:
+    """Equilibria over vertices that half-branches over edges lead to, and points inside edges.
+
+    And where those first turn back that run round rings. Half-branches are given by their numbers,
+    with points near their beginnings; these numbers are the lanes of the points inside, which are
+    in order.
+    """
+    mesh, setting = pairing.mesh, pairing.setting
+    reached, met, turns = [], [], dict[int, Place]()
     towards = (front.tangent_t > 0.0).astype(int)
-    z, p = front.z, line.take(owner).parameters(front.t)
-    edges, met = store.edge[alone[owner]], []
+    z, p = front.z, line.parameters(front.t)
     for _ in range(TURNS):
         goal = mesh.edges[edges, towards]
         way = setting.parameters(mesh.vertices[goal]) - p
@@ -137,6 +157,11 @@ def _beyond(pairing: Pairing, alone: Int[np.ndarray, " crossings"]) -> Seeds:
         inside = points_inside(pairing, edges, outcome, ways, leads_on)
         inside = _from_starts(z, ways, inside.take(leads_on[inside.lanes]))
         met.append(replace(inside, lanes=halves[inside.lanes]))
+        passed = outcome.passed
+        for lane, t in zip(
+            *(each[passed.code == EventCode.FOLD] for each in (passed.lanes, passed.t)), strict=True
+        ):
+            turns.setdefault(int(halves[lane]), ways.start[lane] + t * ways.velocity[lane])
         there = outcome.code == EventCode.ARRIVED
         reached.append(polish(setting, mesh, goal[there], outcome.z[there])[0])
         back = np.flatnonzero(outcome.code == EventCode.RETURNED)
@@ -144,9 +169,9 @@ def _beyond(pairing: Pairing, alone: Int[np.ndarray, " crossings"]) -> Seeds:
         halves = halves[back]
         if len(back) == 0:
             break
-    _enter_arcs(pairing, alone, Inside.concatenate(met))
     vertices, z, p, index = (np.concatenate(column) for column in zip(*reached, strict=True))
-    return vertices, z, p, index
+    rings = {half: turns[half] for half in halves.tolist() if half in turns}
+    return (vertices, z, p, index), Inside.concatenate(met), rings
 
 
 def _starts(
@@ -155,17 +180,24 @@ def _starts(
     """Numbers of the half-branches at all crossings, four each, and points on them."""
     store = pairing.points
     z, p = store.z[alone], store.p[alone]
-    t = np.einsum("li,li->l", p - line.start, line.velocity) / (line.velocity**2).sum(axis=1)
     tangents = _tangents(pairing, line, z, p)
-    owner = np.repeat(np.arange(len(alone)), 4)
-    here = Front(z[owner], t[owner], *tangents, np.zeros(len(owner), int))
-    good = np.zeros(len(owner), bool)
+    owner = np.repeat(np.arange(len(alone)), CURVES * HALVES)
+    return first_steps(pairing, line.take(owner), z[owner], p[owner], tangents)
+
+
+def first_steps(
+    pairing: Pairing, line: ParameterLine, z: Lanes, p: Parameters, tangents: tuple[Lanes, Values]
+) -> tuple[Int[np.ndarray, " m"], Front]:
+    """Points on half-branches that begin with known tangents on lines, and which these are."""
+    t = np.einsum("li,li->l", p - line.start, line.velocity) / (line.velocity**2).sum(axis=1)
+    here = Front(z, t, *tangents, np.zeros(len(z), int))
+    good = np.zeros(len(z), bool)
     there = here
     for distance in DISTANCES:
         todo = np.flatnonzero(~good)
         if len(todo) == 0:
             break
-        lines = line.take(owner[todo])
+        lines = line.take(todo)
         front, found = step_along(lines, here.take(todo), np.full(len(todo), distance))
         inside = found & (front.t > 0.0) & (front.t < 1.0)
         inside &= are_feasible(pairing.setting.constraints, front.z, lines.parameters(front.t))

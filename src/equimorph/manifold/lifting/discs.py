@@ -18,8 +18,9 @@ from equimorph.manifold.lifting.crossing_discs import (
     put_hubs,
     split_crossings,
 )
+from equimorph.manifold.lifting.fold_walks import fold_exits
 from equimorph.manifold.lifting.fold_ways import continuous_ways
-from equimorph.manifold.lifting.loops import Loops, Polygon
+from equimorph.manifold.lifting.loops import Loops
 from equimorph.manifold.lifting.pairing import Pairing
 from equimorph.manifold.lifting.patterns import cut_by_pattern
 from equimorph.manifold.lifting.polygon_cuts import (
@@ -37,6 +38,7 @@ from equimorph.manifold.lifting.polygon_cuts import (
     planes,
     triangulate,
 )
+from equimorph.manifold.lifting.polygons import Polygon
 
 BULGE = 0.2
 """How far corners may lie beyond a side of their grid triangle, as a barycentric coordinate: on
@@ -86,6 +88,7 @@ def assemble(pairing: Pairing, loops: Loops) -> Discs:
     """Triangulate all polygons; plain ones are triangles already, others are cut by pattern."""
     found = _Found()
     found.undecided.update(loops.ambiguous, loops.broken)
+    found.astray.extend(loops.astray)
     found.undecided.update(_alone(pairing))
     whole, left = cut_by_pattern(pairing, loops.polygons)
     found.undecided.update(whole.undecided.tolist())
@@ -180,6 +183,7 @@ def _close(pairing: Pairing, plans: list[Plan], found: _Found) -> None:
     met = pin_ends(pairing, [open_plans[k] for k in crossing])
     for k, point in zip(crossing, met, strict=True):
         extra[k] = point
+    _add_corners(pairing, open_plans, extra)
     for plan, point in zip(open_plans, extra, strict=True):
         if point is None:
             found.undecided.add(plan.polygon.triangle)
@@ -189,6 +193,17 @@ def _close(pairing: Pairing, plans: list[Plan], found: _Found) -> None:
             continue
         found.caps.update({chord_of(plan.points[0], point), chord_of(plan.points[-1], point)})
         plan.append(point, int(pairing.points.kind[point]))
+
+
+def _add_corners(pairing: Pairing, plans: list[Plan], extra: list[int | None]) -> None:
+    """Corners that were not found between the ends of polygons, along their folds."""
+    folds = [plan.those(TURN) for plan in plans]
+    lost = [k for k, own in enumerate(folds) if extra[k] is None and len(own) == 1]
+    pairs = [(plans[k].polygon.triangle, folds[k][0]) for k in lost]
+    for k, exit_ in zip(lost, fold_exits(pairing, pairs), strict=True):
+        if exit_ is not None and exit_.edge < 0:
+            low = int(pairing.points.index[folds[k][0]])
+            extra[k] = pairing.points.add(exit_.z, exit_.p, low, VertexKind.CORNER)
 
 
 def _through(plan: Plan) -> int:

@@ -5,7 +5,6 @@ there, so that the curves form closed loops, and open chains that end on a const
 Each loop, and a chain closed along the constraint, bounds a disc of the equilibrium set.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import groupby
@@ -20,7 +19,9 @@ from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.geometry.tangents import cap_normals, frames_in_embedding, tangent_frames
 from equimorph.manifold.lifting.courses import Courses
 from equimorph.manifold.lifting.kernels import close_loops, find_plain_loops
+from equimorph.manifold.lifting.layer_chains import join_layers
 from equimorph.manifold.lifting.pairing import Pairing
+from equimorph.manifold.lifting.polygons import Polygon, Polygons
 
 ALONG, ASIDE = 0.1, 0.3
 """Sines of angles between sheets and chords: along them at most, aside at least."""
@@ -32,59 +33,6 @@ AT_ONCE = 8192
 NEARER = 0.5
 """Most that the gap in a chain may be, relative to the distance from another chain."""
 Pairwise = Bool[np.ndarray, "n n"]
-
-
-@dataclass(frozen=True)
-class Polygon:
-    """Boundary of a disc over one triangle: points in order; `open` if closed along a constraint.
-
-    An open polygon runs from its first to its last point; the closing side lies on the constraint.
-    So does, if it consists of two chains, the side that ends at the place `gap` among its points.
-    """
-
-    triangle: int
-    points: tuple[int, ...]
-    open: bool
-    gap: int = 0
-
-
-@dataclass(frozen=True)
-class Polygons:
-    """Polygons as arrays, see `Polygon`: points of the k-th from ``starts[k]`` to its next."""
-
-    points: Int[np.ndarray, " all"]
-    starts: Int[np.ndarray, " n1"]
-    triangle: Items
-    open: ItemFlags
-    gap: Items
-
-    @classmethod
-    def of(cls, polygons: Sequence[Polygon]) -> "Polygons":
-        """Arrays of some polygons."""
-        lengths = [len(each.points) for each in polygons]
-        return cls(
-            np.array([point for each in polygons for point in each.points], int),
-            np.concatenate([[0], np.cumsum(np.array(lengths, int))]),
-            np.array([each.triangle for each in polygons], int),
-            np.array([each.open for each in polygons], bool),
-            np.array([each.gap for each in polygons], int),
-        )
-
-    def each(self, rows: Some) -> list[Polygon]:
-        """Some of the polygons as records."""
-        return [
-            Polygon(triangle, tuple(self.points[first:last].tolist()), is_open, gap)
-            for triangle, first, last, is_open, gap in zip(
-                self.triangle[rows].tolist(), self.starts[rows].tolist(),
-                self.starts[rows + 1].tolist(), self.open[rows].tolist(), self.gap[rows].tolist(),
-                strict=True,
-            )
-        ]  # fmt: skip
-
-    def of_length(self, length: int) -> tuple[Some, Int[np.ndarray, "some length"]]:
-        """Polygons with so many points, and these."""
-        rows = np.flatnonzero(np.diff(self.starts) == length)
-        return rows, self.points[self.starts[rows, None] + np.arange(length)]
 
 
 @dataclass(frozen=True)
@@ -100,6 +48,8 @@ class Loops:
     """Triangles with several open chains: which ends belong together is not decided there."""
     broken: list[int]
     """Triangles whose curves do not close, or close only after going around twice."""
+    astray: list[tuple[int, int, int, int]]
+    """Ambiguous triangles with a fold that leads out where no curve is known, see `Discs`."""
 
 
 def find_loops(pairing: Pairing, wanted: Bool[np.ndarray, " T"] | None = None) -> Loops:
@@ -112,9 +62,23 @@ def find_loops(pairing: Pairing, wanted: Bool[np.ndarray, " T"] | None = None) -
     several = chains > 1
     several[_with_arc(pairing)] = True
     rows = np.flatnonzero(several[polygons.triangle])
-    special, ambiguous, unjoined = _decide(pairing, polygons.each(rows))
+    layers = _over_layers(pairing, triangles[several[triangles]])
+    found = sorted([*polygons.each(rows), *layers], key=attrgetter("triangle"))
+    special, ambiguous, unjoined, astray = _decide(pairing, found)
     alone = _alone(polygons, ~several[polygons.triangle])
-    return Loops(plain, owner, alone, special, ambiguous, [*broken.tolist(), *unjoined])
+    return Loops(plain, owner, alone, special, ambiguous, [*broken.tolist(), *unjoined], astray)
+
+
+def _over_layers(pairing: Pairing, triangles: Items) -> list[Polygon]:
+    """Arcs without a crossing over the sides of triangles, as open chains."""
+    kinds = pairing.points.kind
+    return [
+        Polygon(triangle, arc, True)
+        for triangle in triangles.tolist()
+        for edge in pairing.mesh.sides[triangle].tolist()
+        for arc in pairing.arcs.get(edge, ())
+        if VertexKind.CROSSING not in kinds[list(arc)]
+    ]
 
 
 def _close(
@@ -155,24 +119,39 @@ def _with_arc(pairing: Pairing) -> Some:
     return np.flatnonzero(has[pairing.mesh.sides].any(axis=1))
 
 
+Astray = tuple[int, int, int, int]
+
+
 def _decide(
     pairing: Pairing, polygons: list[Polygon]
-) -> tuple[list[Polygon], list[int], list[int]]:
-    """Polygons in triangles with arcs or several chains; triangles without a decision; broken."""
+) -> tuple[list[Polygon], list[int], list[int], list[Astray]]:
+    """Polygons in triangles with arcs or several chains; triangles without a decision; broken.
+
+    And folds that lead out of triangles where no curve is known.
+    """
     decided: list[Polygon] = []
     ambiguous: list[int] = []
     broken: list[int] = []
+    lost: list[Astray] = []
+    groups: dict[int, list[Polygon]] = {}
     for triangle, own in groupby(polygons, key=attrgetter("triangle")):
         found, joined = _with_arcs(pairing, triangle, list(own))
-        chains = [polygon for polygon in found if polygon is not None and polygon.open]
         if any(polygon is None for polygon in found):
             broken.append(triangle)
-        elif len(chains) > 1 and not _closes_alone(pairing, chains):
+        else:
+            groups[triangle] = [polygon for polygon in found if polygon is not None]
+            decided.extend(joined)
+    for triangle, layers in join_layers(pairing, groups).items():
+        chains = [polygon for polygon in layers.left if polygon.open]
+        lost.extend(layers.astray)
+        doubt = layers.unclear or len(layers.astray) > 0
+        if doubt or (len(chains) > 1 and not _closes_alone(pairing, chains)):
             ambiguous.append(triangle)
         else:
-            decided.extend(polygon for polygon in found if polygon is not None)
-            decided.extend(joined)
-    return decided, ambiguous, broken
+            decided.extend([*layers.left, *layers.told])
+    undecided = set(ambiguous)
+    decided = [polygon for polygon in decided if polygon.triangle not in undecided]
+    return decided, ambiguous, broken, lost
 
 
 def _with_arcs(
@@ -184,7 +163,8 @@ def _with_arcs(
     another arc or an open chain. Where there is no such crossing, it leaves with the first.
     """
     sides = pairing.mesh.sides[triangle].tolist()
-    arcs = [Polygon(triangle, arc, True) for edge in sides for arc in pairing.arcs.get(edge, ())]
+    every = [Polygon(triangle, arc, True) for edge in sides for arc in pairing.arcs.get(edge, ())]
+    arcs = [arc for arc in every if _crossings(pairing, arc)]
     polygons, joined = list(found), []
     if not arcs:
         return [*found], []

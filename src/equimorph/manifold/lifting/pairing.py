@@ -7,16 +7,18 @@ Tangents of the set at its points over grid vertices tell where rays end: see do
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum
+from typing import NamedTuple
 
 import numpy as np
 
-from equimorph.arrays import Float, Int, ItemFlags, Items
+from equimorph.arrays import Float, Int, Items
 from equimorph.columns import Columns
 from equimorph.equilibria import ParameterLine
 from equimorph.linalg.determinants import in_units
 from equimorph.manifold.complex.base_mesh import BaseMesh
 from equimorph.manifold.geometry.points import Points, VertexKind
 from equimorph.manifold.geometry.setting import Setting
+from equimorph.manifold.lifting.curves import Curves
 from equimorph.tolerances import SAME_STATE
 
 NONE = -1
@@ -93,62 +95,6 @@ class RayMark(IntEnum):
     """One step cannot lift them."""
 
 
-class Curves:
-    """Lifted edges: edge, start point, end point (−1: left through a constraint), inner points."""
-
-    def __init__(self) -> None:
-        self.count, self._columns = 0, np.zeros((4, 0), int)
-        self.inner: dict[int, list[int]] = {}
-
-    @property
-    def edge(self) -> Items:
-        """Edge of each curve."""
-        return self._columns[0, : self.count]
-
-    @property
-    def start(self) -> Items:
-        """Point at which each curve starts."""
-        return self._columns[1, : self.count]
-
-    @property
-    def end(self) -> Items:
-        """Point at which each curve ends; −1 where it left through a constraint."""
-        return self._columns[2, : self.count]
-
-    @property
-    def plain(self) -> ItemFlags:
-        """Which curves have no inner points."""
-        return np.asarray(self._columns[3, : self.count] == 0)
-
-    def add(self, edge: int, start: int, end: int, inner: list[int]) -> int:
-        """Add a curve; return its number."""
-        self._make_room(self.count + 1)
-        number, self.count = self.count, self.count + 1
-        self._columns[:, number] = edge, start, end, 0
-        self.put_inside(number, inner)
-        return number
-
-    def extend(self, edges: Items, starts: Items, ends: Items) -> Items:
-        """Add curves without inner points; return their numbers."""
-        known, self.count = self.count, self.count + len(edges)
-        self._make_room(self.count)
-        for own, column in zip(self._columns, (edges, starts, ends, 0), strict=True):
-            own[known : self.count] = column
-        return np.arange(known, self.count)
-
-    def put_inside(self, curve: int, inner: list[int]) -> None:
-        """Enter the inner points of a curve, if it has any."""
-        if inner:
-            self.inner[curve] = inner
-            self._columns[3, curve] = len(inner)
-
-    def _make_room(self, count: int) -> None:
-        if count > self._columns.shape[1]:
-            grown = np.empty((4, max(2 * self._columns.shape[1], count, 64)), int)
-            grown[:, : self._columns.shape[1]] = self._columns
-            self._columns = grown
-
-
 @dataclass(frozen=True)
 class Rays(Columns):
     """Edges seen from points over one of their ends: the first or the second."""
@@ -156,6 +102,17 @@ class Rays(Columns):
     points: Items
     edges: Items
     sides: Items
+
+
+class FoldExit(NamedTuple):
+    """State at which a fold leaves a grid triangle, and the edge over which it lies.
+
+    −1 if it is a corner inside, where the fold meets a constraint.
+    """
+
+    edge: int
+    z: Float[np.ndarray, " size"]
+    p: Float[np.ndarray, " parameters"]
 
 
 @dataclass
@@ -181,11 +138,16 @@ class Pairing:
     """Points of each edge at which two curves cross."""
     arcs: dict[int, list[tuple[int, ...]]] = field(default_factory=dict)
     """Curves over each edge that come from a constraint, pass a crossing, and on both sides of it
-    maybe folds, and leave through a constraint: their points."""
+    maybe folds, or a fold alone, and leave through a constraint: their points."""
+    exits: dict[tuple[int, ...], FoldExit | None] = field(default_factory=dict)
+    """Where folds leave triangles, by the corners of these and the fold, as far as that was asked
+    for."""
     hubs: dict[tuple[int, int], int] = field(default_factory=dict)
     """Points between two of these at which a fold of one of the sheets crosses, too."""
     tips: dict[tuple[int, int], int] = field(default_factory=dict)
     """Points of folds, by the points on both sides between which they turn sharply."""
+    rings: dict[int, float] = field(default_factory=dict)
+    """Edges over which a curve between two folds closes, with the part of the way between these."""
     looked_at: int = 0
     """Curves that were looked at for zeros that they hide; see `take_back_hiding`."""
 

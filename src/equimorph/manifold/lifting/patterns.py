@@ -13,7 +13,6 @@ import numpy as np
 from equimorph.arrays import Int, Items, Some, Triples
 from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.setting import embed
-from equimorph.manifold.lifting.loops import Polygons
 from equimorph.manifold.lifting.pairing import Pairing
 from equimorph.manifold.lifting.polygon_cuts import (
     MEETING,
@@ -27,6 +26,7 @@ from equimorph.manifold.lifting.polygon_cuts import (
     match_folds,
     triangulate,
 )
+from equimorph.manifold.lifting.polygons import Polygons
 
 Folds = Int[np.ndarray, "f 2"]
 """Pairs of points on folds."""

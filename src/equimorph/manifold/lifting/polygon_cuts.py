@@ -13,8 +13,8 @@ import numpy as np
 from equimorph.arrays import Bool, Float, Int
 from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.simplices import plane_bases
-from equimorph.manifold.lifting.loops import Polygon
 from equimorph.manifold.lifting.pairing import Pairing
+from equimorph.manifold.lifting.polygons import Polygon
 
 Piece = tuple[int, ...]
 Chord = tuple[int, int]

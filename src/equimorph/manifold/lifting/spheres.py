@@ -1,220 +1,60 @@
-"""Connected surfaces that the discs over the faces of each grid tetrahedron form.
+"""Surfaces of discs over grid tetrahedra closed by lids on constraints, and parted along folds.
 
-And the regions of closed ones between folds, with the points from which they are coned.
+And the regions between folds, with the points from which they are coned.
 """
 
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from equimorph.arrays import Bool, Float, Int, ItemFlags, Items, ItemValues, Pairs, Triples
-from equimorph.linalg.graphs import components
-from equimorph.manifold.complex.base_mesh import BaseMesh
+from equimorph.arrays import Bool, Float, Int, ItemFlags, Items, ItemValues, Triples
 from equimorph.manifold.geometry.simplices import volumes
-from equimorph.manifold.geometry.topology import (
-    adjacency,
-    distinct,
-    keys_of,
-    labels,
-    orientation,
-    runs,
-)
-from equimorph.manifold.lifting.discs import Discs
-
-
-@dataclass(frozen=True)
-class Surfaces:
-    """Triangles of surfaces over grid tetrahedra, closed or open along one loop at a constraint.
-
-    corners, index, surface: of the triangles, those of one surface in a row; met: which of their
-    sides ab, bc, ca lie where another sheet crosses; owner: grid tetrahedron of each surface; rims:
-    open sides, with their surface and the adjacent index.
-    """
-
-    corners: Triples
-    index: Items
-    surface: Items
-    met: Bool[np.ndarray, "n 3"]
-    owner: Int[np.ndarray, " S"]
-    rims: Int[np.ndarray, "r 2"]
-    rim_surface: Int[np.ndarray, " r"]
-    rim_index: Int[np.ndarray, " r"]
-
-
-@dataclass(frozen=True)
-class Spheres:
-    """Spheres that are tetrahedra of one index, general ones, and undecided grid tetrahedra."""
-
-    plain: Int[np.ndarray, "P 4"]
-    plain_index: Int[np.ndarray, " P"]
-    plain_owner: Int[np.ndarray, " P"]
-    others: Surfaces
-    doubtful: Int[np.ndarray, " k"]
-
-
-@dataclass(frozen=True)
-class Rings:
-    """Closed curves that edges form, group by group.
-
-    label: curve of each edge; amount: of curves of each group; closed: groups in which two edges
-    meet at every point.
-    """
-
-    label: Items
-    amount: Int[np.ndarray, " groups"]
-    closed: Bool[np.ndarray, " groups"]
-
-
-@dataclass(frozen=True)
-class _Copies:
-    """Triangles of discs as seen from the grid tetrahedra, sorted by the pieces that they form."""
-
-    corners: Triples
-    index: Items
-    owner: Items
-    met: Bool[np.ndarray, "n 3"]
-    shares: Triples
-    """How many triangles of the same tetrahedron share sides ab, bc, ca; of the same sheet, where
-    another crosses."""
-    starts: Int[np.ndarray, " pieces"]
-    sizes: Int[np.ndarray, " pieces"]
-
-
-def find_spheres(mesh: BaseMesh, discs: Discs, wanted: Bool[np.ndarray, " N"]) -> Spheres:
-    """Join the discs around flagged grid tetrahedra without undecided triangles."""
-    copies = _copies(mesh, discs, wanted)
-    starts, sizes = copies.starts, copies.sizes
-    lowest, highest = (f.reduceat(copies.index, starts) for f in (np.minimum, np.maximum))
-    closed = np.logical_and.reduceat((copies.shares == 2).all(axis=1), starts)
-    candidates = np.flatnonzero(closed & (sizes == 4) & (lowest == highest))
-    rows = starts[candidates, None] + np.arange(4)
-    points = np.sort(copies.corners[rows].reshape(-1, 12), axis=1).reshape(-1, 4, 3)
-    four = (points == points[:, :, :1]).all(axis=(1, 2))
-    plain = np.zeros(len(starts), bool)
-    plain[candidates[four]] = True
-    others, doubtful = _surfaces(copies, plain)
-    return Spheres(
-        points[four, :, 0],
-        copies.index[starts[candidates[four]]],
-        copies.owner[starts[candidates[four]]],
-        others,
-        doubtful,
-    )
-
-
-def _surfaces(
-    copies: _Copies, plain: Bool[np.ndarray, " pieces"]
-) -> tuple[Surfaces, Int[np.ndarray, " k"]]:
-    """Pieces that are not plain, and the owners of those with several rims or crowded sides."""
-    piece = np.repeat(np.arange(len(copies.sizes)), copies.sizes)
-    sides = np.stack([copies.corners, np.roll(copies.corners, -1, axis=1)], axis=2)
-    open_ = (copies.shares == 1) & ~plain[piece, None]
-    row, side = np.nonzero(open_)
-    rims = rings(sides[row, side], piece[row], len(plain))
-    crowded = np.logical_or.reduceat((copies.shares > 2).any(axis=1), copies.starts)
-    bad = ~plain & (crowded | ~rims.closed | (rims.amount > 1))
-    good = ~plain & ~bad
-    number = np.cumsum(good) - 1
-    own, rim = good[piece], good[piece[row]]
-    surfaces = Surfaces(
-        copies.corners[own],
-        copies.index[own],
-        number[piece[own]],
-        copies.met[own],
-        copies.owner[copies.starts[good]],
-        sides[row[rim], side[rim]],
-        number[piece[row[rim]]],
-        copies.index[row[rim]],
-    )
-    return surfaces, np.unique(copies.owner[copies.starts[bad]])
-
-
-def rings(edges: Pairs, group: Items, groups: int) -> Rings:
-    """Curves of edges that hang together within their group."""
-    base = int(edges.max(initial=0)) + 1
-    _, ends = np.unique((group[:, None] * base + edges).ravel(), return_inverse=True)
-    ends = ends.reshape(-1, 2)
-    degree = np.bincount(ends.ravel())
-    of_point = labels(len(degree), ends)
-    _, first, label = np.unique(of_point[ends[:, 0]], return_index=True, return_inverse=True)
-    closed = np.ones(groups, bool)
-    closed[group[(degree[ends] != 2).any(axis=1)]] = False
-    return Rings(label, np.bincount(group[first], minlength=groups), closed)
-
-
-def _copies(mesh: BaseMesh, discs: Discs, wanted: Bool[np.ndarray, " N"]) -> _Copies:
-    """Every triangle of a disc once for each adjacent flagged grid tetrahedron."""
-    amount = np.bincount(discs.owner, minlength=len(mesh.triangles))
-    first = np.concatenate([[0], np.cumsum(amount)])
-    by_owner = np.argsort(discs.owner, kind="stable")
-    unclear = np.zeros(len(mesh.triangles), bool)
-    unclear[discs.doubtful] = True
-    clear = np.flatnonzero(wanted & ~unclear[mesh.faces].any(axis=1))
-    faces = mesh.faces[clear].ravel()
-    count = amount[faces]
-    triangle = by_owner[runs(first[faces], count)[1]]
-    owner = np.repeat(np.repeat(clear, 4), count)
-    met = discs.met[triangle]
-    shares, piece = _pieces(
-        discs.corners[triangle], owner, np.where(met, 1 + discs.sheet[triangle, None], 0)
-    )
-    order = np.argsort(piece, kind="stable")
-    sizes = np.bincount(piece)
-    starts = np.cumsum(sizes) - sizes
-    corners, index = discs.corners[triangle[order]], discs.index[triangle[order]]
-    return _Copies(corners, index, owner[order], met[order], shares[order], starts, sizes)
-
-
-def _pieces(corners: Triples, owner: Items, sheet: Triples) -> tuple[Triples, Items]:
-    """How many triangles share each side within a tetrahedron, and the pieces that they form.
-
-    Sides of different sheets are different, but for sheet 0.
-    """
-    base = int(corners.max(initial=0)) + 1
-    keys = np.stack([keys_of(corners[:, [k, (k + 1) % 3]], base) for k in range(3)], axis=1)
-    _, edges = np.unique(keys.ravel(), return_inverse=True)
-    local = np.repeat(owner, 3) * (edges.max(initial=0) + 1) + edges.ravel()
-    local = local * (sheet.max(initial=0) + 1) + sheet.ravel()
-    _, inverse, counts = np.unique(local, return_inverse=True, return_counts=True)
-    order = np.argsort(inverse, kind="stable")
-    same = np.flatnonzero(inverse[order[1:]] == inverse[order[:-1]])
-    pairs = np.stack([order[same], order[same + 1]], axis=1) // 3
-    return counts[inverse].reshape(-1, 3), components(len(owner), pairs)
+from equimorph.manifold.geometry.topology import adjacency, distinct, keys_of, labels, orientation
+from equimorph.manifold.lifting.surfaces import Surfaces, rings
 
 
 @dataclass(frozen=True)
 class Closed:
-    """Triangles of closed surfaces: some with a lid on the constraint.
+    """Triangles of closed surfaces: some with lids on the constraint.
 
-    corners, index, surface, lid: of the triangles; met: which of their sides ab, bc, ca lie where
-    another sheet crosses; owner, cap: of the surfaces, their grid
-    tetrahedron, and the point from which the lid was drawn (−1 if there is none).
+    corners, index, surface, rim: of the triangles, `rim` the number of the loop that a lid closes,
+    −1 for others; met: which of their sides ab, bc, ca lie where another sheet crosses; owner: grid
+    tetrahedron of each surface; caps: of the loops, the point from which the lid was drawn, −1 if
+    there is none.
     """
 
     corners: Triples
     index: Items
     surface: Items
-    lid: ItemFlags
+    rim: Items
     met: Bool[np.ndarray, "n 3"]
     owner: Int[np.ndarray, " S"]
-    cap: Int[np.ndarray, " S"]
+    caps: Int[np.ndarray, " rims"]
+
+    @property
+    def lid(self) -> ItemFlags:
+        """Which triangles are parts of lids."""
+        return np.asarray(self.rim >= 0)
 
 
 @dataclass(frozen=True)
 class Parts:
     """How closed surfaces are parted.
 
-    region: of each triangle; region_surface, region_index, first_curve: of the regions, one of the
-    curves around it (−1 if there is none); folds, curve, beside: sides between two indices, or
+    region: of each triangle; region_surface, region_index, region_cap, first_curve: of the regions,
+    the point from which their lid was drawn and one of the curves around them (−1 if there is
+    none); folds, curve, beside: sides between two indices, or
     where another sheet crosses, the closed curve that they belong to, and the regions on both
     sides; curve_surface, curve_met: of the curves, the surface and whether another sheet crosses;
-    whole: surfaces that are spheres, parted without contradiction.
+    whole: surfaces that are spheres, parted without contradiction. Regions have one lid at most:
+    between two, the constraint might be a tube.
     """
 
     closed: Closed
     region: Items
     region_surface: Int[np.ndarray, " regions"]
     region_index: Int[np.ndarray, " regions"]
+    region_cap: Int[np.ndarray, " regions"]
     first_curve: Int[np.ndarray, " regions"]
     folds: Int[np.ndarray, "f 2"]
     curve: Int[np.ndarray, " f"]
@@ -226,7 +66,7 @@ class Parts:
 
 def closed_surfaces(
     surfaces: Surfaces,
-    caps: Int[np.ndarray, " S"],
+    caps: Int[np.ndarray, " rims"],
     wanted: Bool[np.ndarray, " S"],
     crossing: Bool[np.ndarray, " points"],
 ) -> Closed:
@@ -235,27 +75,27 @@ def closed_surfaces(
     `crossing` flags the points that are crossings: between two of them, lids are met.
     """
     number = np.cumsum(wanted) - 1
-    own, rim = wanted[surfaces.surface], wanted[surfaces.rim_surface]
-    rim &= (surfaces.rims != caps[surfaces.rim_surface, None]).all(axis=1)
-    at, sides, index = surfaces.rim_surface[rim], surfaces.rims[rim], surfaces.rim_index[rim]
-    capped = caps[at] >= 0
-    fans = np.concatenate([np.sort(sides[capped], axis=1), caps[at[capped], None]], axis=1)
+    own, open_ = wanted[surfaces.surface], wanted[surfaces.rim_surface][surfaces.rim]
+    open_ &= (surfaces.sides != caps[surfaces.rim, None]).all(axis=1)
+    rim, sides, index = surfaces.rim[open_], surfaces.sides[open_], surfaces.side_index[open_]
+    capped = caps[rim] >= 0
+    fans = np.concatenate([np.sort(sides[capped], axis=1), caps[rim[capped], None]], axis=1)
     # rims without a cap have three sides, one after the other
-    order = np.flatnonzero(~capped)[np.argsort(at[~capped], kind="stable")]
+    order = np.flatnonzero(~capped)[np.argsort(rim[~capped], kind="stable")]
     first, second = order[::3], order[1::3]
     third = np.where(
         (sides[second] == sides[first, :1]) | (sides[second] == sides[first, 1:]), -1, sides[second]
     ).max(axis=1)
     triangles = np.concatenate([sides[first], third[:, None]], axis=1)
-    lids = np.concatenate([fans, triangles])
+    lids, closing = np.concatenate([fans, triangles]), np.concatenate([rim[capped], rim[first]])
     return Closed(
         np.concatenate([surfaces.corners[own], lids]),
         np.concatenate([surfaces.index[own], index[capped], index[first]]),
-        number[np.concatenate([surfaces.surface[own], at[capped], at[first]])],
-        np.arange(own.sum() + len(lids)) >= own.sum(),
+        number[np.concatenate([surfaces.surface[own], surfaces.rim_surface[closing]])],
+        np.concatenate([np.full(np.count_nonzero(own), -1), closing]),
         np.concatenate([surfaces.met[own], _sides_on_crossings(lids, crossing)]),
         surfaces.owner[wanted],
-        caps[wanted],
+        caps,
     )
 
 
@@ -303,10 +143,23 @@ def part(closed: Closed, marks: Float[np.ndarray, " points"]) -> Parts:
     whole = curves.closed & (_characteristics(closed, base) == 2)
     whole &= np.bincount(region_surface, minlength=count) == curves.amount + 1
     whole[fold_surface[~fits | (met[folded] != curve_met[curves.label])]] = False
+    region_cap, several = _lids(closed, region, len(region_index))
+    whole[region_surface[several]] = False
     return Parts(
-        closed, region, region_surface, region_index, first_curve,
+        closed, region, region_surface, region_index, region_cap, first_curve,
         folds, curves.label, beside, curve_surface, curve_met, whole,
     )  # fmt: skip
+
+
+def _lids(
+    closed: Closed, region: Items, count: int
+) -> tuple[Int[np.ndarray, " regions"], Bool[np.ndarray, " regions"]]:
+    """Points from which the lids of regions were drawn, and which regions have several lids."""
+    lid = np.flatnonzero(closed.lid)
+    first, last = np.full(count, len(closed.caps)), np.full(count, -1)
+    np.minimum.at(first, region[lid], closed.rim[lid])
+    np.maximum.at(last, region[lid], closed.rim[lid])
+    return np.where(last >= 0, np.append(closed.caps, -1)[last], -1), first < last
 
 
 def _in_order(label: Items, marks: ItemValues) -> Items:
@@ -369,7 +222,7 @@ def upright_apexes(
     folded = parts.first_curve >= 0
     inner = np.concatenate([parts.closed.lid, np.ones(2 * len(fans), bool)]) | ~folded[region]
     best, least = apexes.copy(), np.full(count, np.inf)
-    for candidates in (apexes, *_others(parts, middles, lidded)):
+    for candidates in (apexes, *_others(parts, middles)):
         corners = np.concatenate([facets, candidates[region, None]], axis=1)
         volume = volumes(place[corners]) * signs
         total = np.bincount(region, volume, count)
@@ -381,14 +234,13 @@ def upright_apexes(
 
 
 def _others(
-    parts: Parts, middles: Int[np.ndarray, " curves"], lidded: Bool[np.ndarray, " regions"]
+    parts: Parts, middles: Int[np.ndarray, " curves"]
 ) -> tuple[Int[np.ndarray, " regions"], Int[np.ndarray, " regions"]]:
     """Other points from which regions can be coned: of their lid, and of their last curve."""
-    last = np.full(len(lidded), -1)
+    last = np.full(len(parts.region_cap), -1)
     for side in parts.beside.T:
         np.maximum.at(last, side, parts.curve)
-    caps = np.where(lidded, parts.closed.cap[parts.region_surface], -1)
-    return caps, np.append(middles, -1)[last]
+    return parts.region_cap, np.append(middles, -1)[last]
 
 
 def _coherent(facets: Triples, region: Items) -> Items:

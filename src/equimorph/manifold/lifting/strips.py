@@ -19,15 +19,17 @@ def strips_astray(pairing: Pairing, astray: Int[np.ndarray, "a 4"]) -> dict[int,
     """Sides through which strips leave triangles, and where between the fold and the constraint.
 
     `astray`: triangles with the fold and both ends of an open polygon without a corner. Where both
-    sheets go on beside the fold, the side is split over the narrower of them.
+    sheets go on beside the fold, the side is split over the narrower of them. And sides over which
+    rings close, in the middle of these.
     """
+    used = pairing.mesh.edges_in_use
+    out = {edge: share for edge, share in pairing.rings.items() if used[edge]}
     if len(astray) == 0:
-        return {}
+        return out
     triangle, fold = astray[:, 0], astray[:, 1]
     along = [_ways(pairing, triangle, fold, end) for end in astray[:, 2:].T]
     width = np.stack([_widths(each) for each in along])
     chosen, known = width.argmin(axis=0), np.isfinite(width).any(axis=0)
-    out: dict[int, float] = {}
     for k, ways in enumerate(along):
         own = np.flatnonzero(known & (chosen == k))
         out |= split_sides(pairing.mesh, triangle[own], ways.take(own))

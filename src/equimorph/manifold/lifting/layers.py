@@ -1,0 +1,114 @@
+"""Layers of a set beside a fold that pass between grid vertices: arcs over edges lead through them.
+
+Where a constraint leaves only a thin layer beside a fold, an edge that crosses it begins and ends
+beyond: over it lies an arc, from the constraint through the fold to the constraint, of which no
+vertex knows. But in a triangle that sees the layer on another side, the fold leads there.
+
+See docs/decisions.md, "Strips between a fold and a constraint are led along".
+"""
+
+import numpy as np
+
+from equimorph.arrays import Int, Items, Lanes, Parameters, Place
+from equimorph.equilibria.critical import null_border
+from equimorph.manifold.geometry.points import VertexKind
+from equimorph.manifold.lifting.cells import CellFinder, Cells, Close
+from equimorph.manifold.lifting.crossing_branches import (
+    HALVES,
+    edge_lines,
+    first_steps,
+    flood_crossings,
+    lead_out,
+)
+from equimorph.manifold.lifting.edges import Inside
+from equimorph.manifold.lifting.fold_walks import NOISE, fold_at, fold_exits
+from equimorph.manifold.lifting.grid import NEAR_AN_END
+from equimorph.manifold.lifting.pairing import FoldExit, Pairing
+from equimorph.model import Progress
+
+
+def find_through_layers(
+    finder: CellFinder, pairing: Pairing, close: Close | None, progress: Progress
+) -> Cells:
+    """Cells of a set, through layers that are led along; `close` is for the first time."""
+    cells = finder.find(pairing, close)
+    while not pairing.is_full and _enter_layers(pairing, cells.astray):
+        flood_crossings(pairing, progress)
+        cells = finder.find(pairing)
+    return cells
+
+
+def _enter_layers(pairing: Pairing, astray: Int[np.ndarray, "a 4"]) -> bool:
+    """Enter the arcs to which folds lead out of triangles; whether anything new is known.
+
+    `astray`: see `Discs`. What was tried in vain is not tried again.
+    """
+    pairs = [(triangle, fold) for triangle, fold in np.unique(astray[:, :2], axis=0).tolist()]
+    exits = [each for each in fold_exits(pairing, pairs) if each is not None]
+    new = [each for each in exits if each.edge >= 0 and fold_at(pairing, each) < 0]
+    kept: list[FoldExit] = []
+    for one in new:
+        if not any(_same(one, each) for each in kept):
+            kept.append(one)
+    if not kept:
+        return False
+    entered = _enter(pairing, *(np.array(column) for column in zip(*kept, strict=True)))
+    tried = {id(each) for each in new if fold_at(pairing, each) < 0}
+    for key, each in pairing.exits.items():
+        if id(each) in tried:
+            pairing.exits[key] = None
+    return entered
+
+
+def _same(one: FoldExit, other: FoldExit) -> bool:
+    """Whether two folds over edges are the same."""
+    return one.edge == other.edge and bool(
+        max(np.abs(one.z - other.z).max(), np.abs(one.p - other.p).max()) < NOISE
+    )
+
+
+def _enter(pairing: Pairing, edge: Items, z: Lanes, p: Parameters) -> bool:
+    """Follow both halves of the curves through folds over edges, and enter what they lead to."""
+    setting, store = pairing.setting, pairing.points
+    structure, n = setting.structure, setting.structure.unknowns
+    phi = null_border(structure, z, p)
+    phi /= np.sqrt(phi[:, :n] ** 2 @ structure.mass)[:, None]
+    owner, sense = np.divmod(np.arange(HALVES * len(z)), HALVES)
+    line = edge_lines(pairing, edge).take(owner)
+    tangents = np.where(sense, -1.0, 1.0)[:, None] * phi[owner], np.zeros(len(owner))
+    halves, front = first_steps(pairing, line, z[owner], p[owner], tangents)
+    lines = line.take(halves)
+    seeds, met, turns = lead_out(pairing, halves, edge[owner[halves]], lines, front)
+    for half, t in turns.items():  # a vertex between both folds sees the ring
+        k = int(owner[half])
+        middle = _share(pairing, int(edge[k]), 0.5 * (p[k] + t))
+        pairing.rings[int(edge[k])] = min(max(middle, NEAR_AN_END), 1.0 - NEAR_AN_END)
+    count = store.count
+    store.over_vertices(*seeds)
+    left = np.unique(met.lanes[met.kinds == VertexKind.CAP])
+    left = np.setdiff1d(left, met.lanes[met.kinds == VertexKind.CROSSING])
+    entered = np.unique(left[np.isin(left ^ 1, left)] // HALVES).tolist()
+    for k in entered:
+        ends = [met.take(met.lanes == HALVES * k + half) for half in range(HALVES)]
+        _enter_arc(pairing, int(edge[k]), z[k], p[k], ends)
+    pairing.fit()
+    return bool(entered) or store.count > count
+
+
+def _share(pairing: Pairing, edge: int, p: Place) -> float:
+    """Part of the way along an edge at which parameters lie."""
+    free, mesh = pairing.setting.free, pairing.mesh
+    start, end = mesh.vertices[mesh.edges[edge]] / pairing.setting.scales
+    way = end - start
+    return float((p[free] / pairing.setting.scales - start) @ way / (way @ way))
+
+
+def _enter_arc(pairing: Pairing, edge: int, z: Place, p: Place, ends: list[Inside]) -> None:
+    """Enter one arc through a fold."""
+    store = pairing.points
+    first, second = (
+        store.add_many(own.z, own.p, own.index, own.kinds, edge).tolist() for own in ends
+    )
+    low = min(int(store.index[own[0]]) for own in (first, second))
+    fold = store.add(z, p, low, VertexKind.FOLD, edge)
+    pairing.arcs.setdefault(edge, []).append((*first[::-1], fold, *second))
