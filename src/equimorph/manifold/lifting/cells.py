@@ -171,6 +171,8 @@ MULTIPLIED = 4
 """Undecided cells, over what there were at first, beyond which bisection ends."""
 GROWN = 3
 """Equilibria, over what there were at first, that must have paid: fewer cells are undecided."""
+CHEAP = 5000
+"""Equilibria up to which it need not have paid: strips far narrower than cells show late."""
 
 
 @dataclass(frozen=True)
@@ -210,7 +212,7 @@ class Outlook:
         """
         if pairing.is_full or not self.is_dim(cells):
             return pairing.is_full
-        grown = pairing.points.count > GROWN * self.points
+        grown = pairing.points.count > max(GROWN * self.points, CHEAP)
         persists = cells.doubtful >= self.doubtful and grown
         multiplies = cells.doubtful > MULTIPLIED * self.doubtful
         return multiplies or persists or self.is_crowded(pairing, cells)
