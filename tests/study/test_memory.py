@@ -95,10 +95,13 @@ print(peak() - before)
 @pytest.mark.slow
 @pytest.mark.parametrize("intervals", [(20_000,), (12, 15, 8)])
 def test_the_estimate_for_sets_over_one_and_three_parameters(intervals: tuple[int, ...]):
-    """The set alone, beyond what the program takes with a small one."""
+    """The set alone, beyond what the program takes with a small one.
+
+    The larger of two: a kernel that is compiled with the small set hides part of the first.
+    """
     words = [sys.executable, "-c", SET, str(len(intervals)), *map(str, intervals)]
-    done = subprocess.run(words, capture_output=True, text=True, check=True)
-    peak = float(done.stdout.split()[-1])
+    runs = [subprocess.run(words, capture_output=True, text=True, check=True) for _ in range(2)]
+    peak = max(float(done.stdout.split()[-1]) for done in runs)
     estimate = memory.estimated_memory(Rod().size, intervals) - memory.PROGRAM
     assert peak <= estimate <= 2.0 * peak
 
