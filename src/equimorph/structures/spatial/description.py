@@ -27,7 +27,8 @@ from equimorph.structures.spatial.model import (
     raw_model,
     raw_names,
 )
-from equimorph.structures.spatial.phase import OrbitMechanics, PinnedMechanics
+from equimorph.structures.spatial.orbits import OrbitMechanics
+from equimorph.structures.spatial.phase import PinnedMechanics
 from equimorph.structures.spatial.phase_condition import (
     BROKEN_BY,
     check_orbits,

@@ -30,7 +30,8 @@ from equimorph.structures.spatial.natural import (
     pinned_natural_states,
     planar_guess,
 )
-from equimorph.structures.spatial.phase import OrbitMechanics, PinnedMechanics
+from equimorph.structures.spatial.orbits import OrbitMechanics
+from equimorph.structures.spatial.phase import PinnedMechanics
 from equimorph.structures.spatial.quaternions import with_unit_rotations
 from equimorph.structures.states import State
 from equimorph.structures.unit_system import Quantity, Units
