@@ -16,7 +16,7 @@ from equimorph.charts.preparation import crossing_facets, first_copies
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.geometry.setting import embed
-from equimorph.manifold.geometry.topology import Adjacency, adjacency, facets_of, flags_of, pieces
+from equimorph.manifold.geometry.topology import Adjacency, facets_of, flags_of, pieces
 from equimorph.structures import State, States
 from equimorph.tolerances import SAME_SOLUTION
 
@@ -169,10 +169,10 @@ class Atlas:
             out.append(Leaf(self.eset, own, families[int(self.family[own[0]])]))
         return tuple(out)
 
-    @cached_property
+    @property
     def whole(self) -> Adjacency:
         """Which cells share facets."""
-        return adjacency(self.eset.cells)
+        return self.eset.adjacency
 
     @cached_property
     def transitions(self) -> tuple[Transition, ...]:

@@ -25,7 +25,7 @@ from equimorph.arrays import (
 from equimorph.charts.coordinates import Coordinates
 from equimorph.charts.preparation import on_box
 from equimorph.manifold import EquilibriumSet
-from equimorph.manifold.complex.kept_tables import adjacency_of, places_of
+from equimorph.manifold.complex.kept_tables import places_of
 from equimorph.manifold.geometry.points import VertexKind, are_singular, on_fold
 from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.geometry.simplices import longest_sides, middles, sizes_of, volumes
@@ -121,7 +121,7 @@ class Cells:
     def whole(self) -> Adjacency:
         """Which cells share facets."""
         every = len(self.numbers) == len(self.eset.cells)
-        return adjacency_of(self.eset) if every else adjacency(self.corners)
+        return self.eset.adjacency if every else adjacency(self.corners)
 
     @cached_property
     def turn(self) -> Float[np.ndarray, " own"]:
@@ -371,7 +371,7 @@ def facet_kinds(cells: Cells) -> tuple[Facets, np.ndarray]:
     some = np.flatnonzero((whole.counts == 1) | cells.turning)
     facets = whole.facets[some]
     folds = facets_of(eset.folds, facets.shape[1])
-    all_of_them = adjacency_of(eset)
+    all_of_them = eset.adjacency
     outer = flags_of(facets, all_of_them.facets[all_of_them.counts == 1])
     capped = np.isin(eset.kinds, (VertexKind.CAP, VertexKind.CORNER))[facets].all(axis=1)
     met = (eset.kinds == VertexKind.CROSSING)[facets].all(axis=1)

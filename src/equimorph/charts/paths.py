@@ -10,7 +10,7 @@ from equimorph.arrays import CellFlags, CellNumbers, Float, Int, VertexFlags
 from equimorph.charts.preparation import first_copies
 from equimorph.linalg.graphs import shortest_path
 from equimorph.manifold import EquilibriumSet
-from equimorph.manifold.complex.kept_tables import adjacency_of, places_of
+from equimorph.manifold.complex.kept_tables import places_of
 from equimorph.manifold.geometry.points import are_singular, on_fold
 from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.geometry.topology import Adjacency, faces_of
@@ -118,7 +118,7 @@ def _over_edges(eset: EquilibriumSet, start: Place, goal: Place) -> list[int] | 
 
 def _at_end(eset: EquilibriumSet) -> VertexFlags:
     """Vertices on folds at which the set ends: no way should touch them."""
-    whole, at = adjacency_of(eset), np.zeros(len(eset.points), bool)
+    whole, at = eset.adjacency, np.zeros(len(eset.points), bool)
     at[whole.facets[whole.counts == 1]] = True
     return np.asarray(at & on_fold(eset.kinds))
 
@@ -130,7 +130,7 @@ def _straighten(eset: EquilibriumSet, path: list[int]) -> Way:
     folded = are_singular(eset.kinds)
     stops = [0, *(k for k in range(1, len(path) - 1) if folded[path[k]]), len(path) - 1]
     way: Way = [path[0]]
-    ground = Ground(eset.cells, eset.coordinates, adjacency_of(eset))
+    ground = Ground(eset.cells, eset.coordinates, eset.adjacency)
     for a, b in pairwise(stops):
         run = path[a : b + 1]
         if len(run) < 2:

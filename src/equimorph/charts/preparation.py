@@ -8,7 +8,7 @@ import numpy as np
 from equimorph.arrays import Bool, Facets, Float, Int, ItemFlags, Items, Pairs, Some, VertexNumbers
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.complex.excerpts import Excerpt, excerpt_of
-from equimorph.manifold.complex.kept_tables import adjacency_of, from_cache, kept
+from equimorph.manifold.complex.kept_tables import from_cache, kept
 from equimorph.manifold.complex.marked_complex import Fabric
 from equimorph.manifold.complex.vertices import Vertices
 from equimorph.manifold.geometry.points import VertexKind, on_fold
@@ -118,7 +118,7 @@ def _with_cusps(eset: EquilibriumSet) -> EquilibriumSet | None:
     # straight sides of cells at a cusp may pass it on its wrong side
     whole = whole_set(excerpt.put_back(fabric))
     fixed = facets_of((*whole.folds, *whole.crossings), 2)
-    links = adjacency_of(whole)
+    links = whole.adjacency
     cells = flip_inverted_triangles(whole.cells, whole.coordinates, fixed, whole.stratum, links)
     return replace(whole, cells=cells)
 

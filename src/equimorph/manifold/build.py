@@ -9,7 +9,7 @@ import numpy as np
 from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Items, Place
 from equimorph.manifold.complex.description import Frame, wrong_cells
-from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
+from equimorph.manifold.complex.equilibrium_set import EquilibriumSet, with_audit
 from equimorph.manifold.complex.kept_sets import Effort, question_of_set, recall_set
 from equimorph.manifold.geometry.setting import Setting
 from equimorph.manifold.lifting.cells import CellFinder, Cells, Outlook, account
@@ -331,7 +331,7 @@ class _Lifting:
             touching=tuple(_named(box, place) for place in cells.touching),
             grazing=tuple(_named(box, place) for place in found.grazing),
         )
-        return replace(eset, audit=audit)
+        return with_audit(eset, audit)
 
 
 def _divide_wrong(pairing: Pairing, eset: EquilibriumSet) -> bool:

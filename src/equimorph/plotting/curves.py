@@ -8,7 +8,7 @@ from equimorph.arrays import Bool, Float, Int, Shaped
 from equimorph.equilibria import Path, settle
 from equimorph.errors import InputError
 from equimorph.manifold import Division, EquilibriumSet
-from equimorph.manifold.geometry.topology import adjacency, pieces
+from equimorph.manifold.geometry.topology import pieces
 from equimorph.model import position
 from equimorph.structures import States
 from equimorph.tasks.route import Route
@@ -62,7 +62,7 @@ def limit_pieces(division: Division) -> list[tuple[Int[np.ndarray, " _"], int]]:
 
     Vertices of each piece in order, and the lower index of its two sides.
     """
-    facets = adjacency(division.eset.cells).facets
+    facets = division.eset.adjacency.facets
     found = []
     for line in pieces(facets[division.on_level[facets].all(axis=1)]):
         low = _lowest_index_beside(division.eset, line)

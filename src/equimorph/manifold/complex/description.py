@@ -16,6 +16,7 @@ from equimorph.manifold.complex.equilibrium_set import (
     Component,
     EquilibriumSet,
     Stratum,
+    with_audit,
 )
 from equimorph.manifold.geometry.points import are_singular
 from equimorph.manifold.geometry.setting import Setting
@@ -127,7 +128,7 @@ def describe(frame: Frame, given: Complex, lifting: Lifting) -> EquilibriumSet:
         for own in (np.flatnonzero(stratum == k) for k in range(stratum.max(initial=-1) + 1))
     )
     audit = _audit(given, lifting, crossed, whole, component, boundaries, frame.setting, checked)
-    return EquilibriumSet(
+    eset = EquilibriumSet(
         structure=frame.setting.structure,
         box=frame.box,
         fixed=frame.fixed,
@@ -149,6 +150,8 @@ def describe(frame: Frame, given: Complex, lifting: Lifting) -> EquilibriumSet:
         grid_vertex=given.grid_vertex,
         crossings=tuple(pieces(whole.facets[crossed])),
     )
+    vars(eset)["adjacency"] = whole  # it is asked for by checks and by most tasks
+    return eset
 
 
 def describe_again(eset: EquilibriumSet, given: Complex, setting: Setting) -> EquilibriumSet:
@@ -174,7 +177,7 @@ def describe_again(eset: EquilibriumSet, given: Complex, setting: Setting) -> Eq
         deviation=audit.deviation,
         unrefined=audit.unrefined,
     )
-    return replace(out, audit=kept)
+    return with_audit(out, kept)
 
 
 def _boundaries(
@@ -313,14 +316,13 @@ def _senses(
 
 def overturned_cells(eset: EquilibriumSet) -> CellFlags:
     """Return which cells project against the orientation that their index demands."""
-    whole = adjacency(eset.cells)
-    return senses(eset.cells, eset.cell_index, eset.coordinates, whole).overturned
+    return senses(eset.cells, eset.cell_index, eset.coordinates, eset.adjacency).overturned
 
 
 def wrong_cells(eset: EquilibriumSet) -> CellFlags:
     """Return which cells `Audit.wrong` counts."""
     coordinates, scales = eset.coordinates, eset.setting.scales
-    crossings, whole = facets_of(eset.crossings, len(eset.names)), adjacency(eset.cells)
+    crossings, whole = facets_of(eset.crossings, len(eset.names)), eset.adjacency
     sense = _senses(eset.cells, eset.cell_index, coordinates, crossings, whole, eset.component)
     off = overturned_off_folds(eset.kinds, eset.cells, sense.overturned, coordinates / scales)
     of_index = contradictions(eset.points, eset.kinds, eset.cells, eset.cell_index)

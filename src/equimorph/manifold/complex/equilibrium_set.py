@@ -1,7 +1,7 @@
 """The equilibrium set over one to three parameters: a simplicial complex of exact states."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from enum import StrEnum
 from functools import cached_property
 
@@ -14,7 +14,7 @@ from equimorph.manifold.complex.audit import Audit
 from equimorph.manifold.complex.base_mesh import BaseMesh
 from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.setting import Setting
-from equimorph.manifold.geometry.topology import facets_of
+from equimorph.manifold.geometry.topology import Adjacency, adjacency, facets_of
 from equimorph.manifold.lookup.exact_states import StatesOver
 from equimorph.manifold.lookup.near_crossings import NearCrossings, of_set
 from equimorph.manifold.lookup.near_cusps import cusps_near
@@ -161,6 +161,11 @@ class EquilibriumSet(Tabular):
         return np.stack([self.points[name] for name in self.names], axis=1)
 
     @cached_property
+    def adjacency(self) -> Adjacency:
+        """Facets of the cells, and how they hang together."""
+        return adjacency(self.cells)
+
+    @cached_property
     def setting(self) -> Setting:
         """The structure, its free parameters and the constraints that bound the set."""
         low = dict(zip(self.names, self.box.lower.tolist(), strict=True))
@@ -270,11 +275,12 @@ class EquilibriumSet(Tabular):
             self.cells,
             self.cell_index,
             self.component,
+            self.adjacency,
             folded,
             capped,
             self.constraints,
             self._near_crossings(),
-            cusps_near(self.setting, self.points, self.cells, self._turning_folds()),
+            cusps_near(self.setting, self.points, self.adjacency, self._turning_folds()),
         )
 
     def _turning_folds(self) -> Facets:
@@ -289,12 +295,19 @@ class EquilibriumSet(Tabular):
         if not self.crossings:
             return None
         facets = facets_of(self.crossings, len(self.names))
-        return of_set(self.setting, self.points, self.cells, facets)
+        return of_set(self.setting, self.points, self.cells, self.adjacency, facets)
 
 
 def _check_names(names: tuple[str, ...], at: Mapping[str, object]) -> None:
     if set(at) != set(names):
         raise InputError(f"`at` must give {' and '.join(names)}; got {', '.join(at) or 'nothing'}.")
+
+
+def with_audit(eset: EquilibriumSet, audit: Audit) -> EquilibriumSet:
+    """The set with another audit, and all tables that were computed of it."""
+    made = replace(eset, audit=audit)
+    vars(made).update({name: each for name, each in vars(eset).items() if name != "audit"})
+    return made
 
 
 def check_cells(eset: EquilibriumSet) -> None:

@@ -18,7 +18,7 @@ from equimorph.arrays import (
 )
 from equimorph.manifold.complex.description import Complex
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
-from equimorph.manifold.complex.kept_tables import adjacency_of, kept, places_of
+from equimorph.manifold.complex.kept_tables import kept, places_of
 from equimorph.manifold.complex.marked_complex import (
     TRIANGLES,
     Fabric,
@@ -73,7 +73,7 @@ def sheets_of(eset: EquilibriumSet) -> Sheets:
     crossings, folds = (facets_of(pieces, d) for pieces in (eset.crossings, eset.folds))
     cells, origin = cut_at_crossings(eset.cells, crossings, len(eset.points))
     cells = cells.copy()
-    whole = adjacency(cells) if eset.crossings else adjacency_of(eset)
+    whole = adjacency(cells) if eset.crossings else eset.adjacency
     signs = senses(cells, eset.cell_index, eset.coordinates[origin], whole).signs
     place = origin[whole.facets]
     folded, crossed = (flags_of(place, each) for each in (folds, crossings))

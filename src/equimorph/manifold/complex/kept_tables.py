@@ -13,7 +13,6 @@ import numpy as np
 from equimorph.arrays import Cells, Float
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.manifold.geometry.setting import embed
-from equimorph.manifold.geometry.topology import Adjacency, adjacency
 
 Table = TypeVar("Table")
 
@@ -45,12 +44,6 @@ def kept(compute: Callable[[EquilibriumSet], Table]) -> Callable[[EquilibriumSet
         return found
 
     return table
-
-
-@kept
-def adjacency_of(eset: EquilibriumSet) -> Adjacency:
-    """Facets of the cells of a set, and how they hang together."""
-    return adjacency(eset.cells)
 
 
 def places_of(eset: EquilibriumSet) -> Float[np.ndarray, "V coordinates"]:

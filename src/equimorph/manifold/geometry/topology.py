@@ -49,6 +49,16 @@ class Adjacency:
         """Pairs of cells that share a facet."""
         return np.asarray(self.places // self.cell_facets.shape[1])
 
+    @cached_property
+    def beside(self) -> Int[np.ndarray, "F most"]:
+        """Cells that have each facet, −1 where there are fewer than of others."""
+        number = self.cell_facets.ravel()
+        order, first = np.argsort(number, kind="stable"), np.cumsum(self.counts) - self.counts
+        out = np.full((len(self.facets), int(self.counts.max(initial=1))), -1)
+        row = number[order]
+        out[row, np.arange(len(order)) - first[row]] = order // self.cell_facets.shape[1]
+        return out
+
     @property
     def manifold(self) -> Bool[np.ndarray, " N"]:
         """Links across facets of exactly two cells."""

@@ -23,7 +23,7 @@ from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.manifold.geometry.points import are_singular
 from equimorph.manifold.geometry.quadratics import least_in_simplex, through_corners
 from equimorph.manifold.geometry.setting import Setting, embed
-from equimorph.manifold.geometry.topology import adjacency
+from equimorph.manifold.geometry.topology import Adjacency
 from equimorph.structures import States, join_states
 
 DEEP = 0.5
@@ -91,7 +91,7 @@ def _of_cells(eset: EquilibriumSet) -> _Patches:
     known = np.zeros((len(singular), 2))
     known[~singular] = determinants(eset.structure, vertices.z[~singular], vertices.p[~singular])
     plain = np.flatnonzero(~singular[eset.cells].any(axis=1))
-    around = np.concatenate([eset.cells, _across(eset.cells)], axis=1)[plain]
+    around = np.concatenate([eset.cells, _across(eset.cells, eset.adjacency)], axis=1)[plain]
     unit, power = known[around[:, 0]].T
     values = np.where(around == NOWHERE, np.nan, in_units(known[around], power[:, None]))
     values[~np.isfinite(values)] = np.nan
@@ -105,16 +105,12 @@ def _of_cells(eset: EquilibriumSet) -> _Patches:
     return _Patches(unit, power, deep, vertices.z[around], vertices.p[around], values)
 
 
-def _across(cells: Cells) -> Cells:
+def _across(cells: Cells, whole: Adjacency) -> Cells:
     """Vertices of the neighbours of cells opposite to the sides between them."""
-    whole = adjacency(cells)
-    out = np.full(cells.shape, NOWHERE)
-    links, across = whole.links[whole.manifold], whole.across[whole.manifold]
-    for one, other in (links.T, links[:, ::-1].T):
-        own = (whole.cell_facets[one] == across[:, None]).argmax(axis=1)
-        opposite = (whole.cell_facets[other] == across[:, None]).argmax(axis=1)
-        out[one, own] = cells[other, opposite]
-    return out
+    out = np.full(cells.size, NOWHERE)
+    one, other = whole.places[whole.manifold].T
+    out[one], out[other] = cells.ravel()[other], cells.ravel()[one]
+    return out.reshape(cells.shape)
 
 
 def _models(

@@ -38,7 +38,7 @@ from equimorph.equilibria.settle import Guards, lower_index, settle
 from equimorph.manifold.geometry.exact_points import Aim, Pinned, correct_points
 from equimorph.manifold.geometry.setting import Setting, embed
 from equimorph.manifold.geometry.simplices import shares_in
-from equimorph.manifold.geometry.topology import adjacency, keys_of, rows_of
+from equimorph.manifold.geometry.topology import Adjacency, keys_of, rows_of
 from equimorph.manifold.lookup.cell_index import Hits
 from equimorph.structures import States, Structure
 
@@ -283,9 +283,10 @@ def at_amplitudes(
     return found.z, -found.unfolding, slope, found.found
 
 
-def of_set(setting: Setting, points: States, cells: Cells, crossings: Facets) -> NearCrossings:
+def of_set(
+    setting: Setting, points: States, cells: Cells, whole: Adjacency, crossings: Facets
+) -> NearCrossings:
     """Facets on crossings, given by their vertices, with the adjacent cells."""
-    whole = adjacency(cells)
     base = len(points)
     keys, own = keys_of(whole.facets, base), np.unique(keys_of(crossings, base))
     at = np.minimum(np.searchsorted(own, keys), len(own) - 1)

@@ -13,7 +13,6 @@ import numpy as np
 from equimorph.arrays import (
     Bool,
     CellNumbers,
-    Cells,
     Facets,
     Float,
     Int,
@@ -28,7 +27,7 @@ from equimorph.columns import Columns
 from equimorph.equilibria.critical import null_border, null_vectors
 from equimorph.equilibria.locus import Locus, nearest
 from equimorph.manifold.geometry.setting import Setting, embed
-from equimorph.manifold.geometry.topology import adjacency, keys_of
+from equimorph.manifold.geometry.topology import Adjacency, keys_of
 from equimorph.manifold.lookup.exact_states import (
     Found,
     Points,
@@ -36,7 +35,6 @@ from equimorph.manifold.lookup.exact_states import (
     in_order,
 )
 from equimorph.manifold.lookup.near_crossings import at_amplitudes
-from equimorph.manifold.lookup.rims import cells_beside
 from equimorph.structures import States, Structure
 
 PlacesOver = Float[np.ndarray, "points d"]
@@ -146,7 +144,9 @@ def united(structure: Structure, parts: list[Found]) -> Found:
     return in_order([(z[rows], point[rows], cell[rows])])
 
 
-def cusps_near(setting: Setting, points: States, cells: Cells, folds: Facets) -> NearCusps | None:
+def cusps_near(
+    setting: Setting, points: States, whole: Adjacency, folds: Facets
+) -> NearCusps | None:
     """The cusps that facets of folds pass, if there are any."""
     facets = folds[_turning(points, folds)]
     if len(facets) == 0:
@@ -169,9 +169,8 @@ def cusps_near(setting: Setting, points: States, cells: Cells, folds: Facets) ->
     ends = np.concatenate([points.p[facets], p[:, None]], axis=1)[:, :, setting.free]
     lower, upper = ends.min(axis=1), ends.max(axis=1)
     margin = AROUND * ((upper - lower) / setting.scales).max(axis=1)[:, None] * setting.scales
-    whole = adjacency(cells)
     keys, wanted = (keys_of(each, len(points)) for each in (whole.facets, facets))
-    beside = cells_beside(whole)[np.searchsorted(keys, wanted)]
+    beside = whole.beside[np.searchsorted(keys, wanted)]
     return NearCusps(z, p, b, reach, lower - margin, upper + margin, beside)
 
 

@@ -24,7 +24,7 @@ from equimorph.arrays import (
     VertexFlags,
 )
 from equimorph.linalg.lanes import in_background, threads
-from equimorph.manifold.geometry.topology import adjacency, senses
+from equimorph.manifold.geometry.topology import Adjacency, senses
 from equimorph.manifold.lookup.cell_index import NUDGE, CellIndex, Hits
 from equimorph.manifold.lookup.exact_states import (
     CLOSEST,
@@ -40,7 +40,7 @@ from equimorph.manifold.lookup.exact_states import (
 from equimorph.manifold.lookup.kernels import balanced, guesses, one_of_each, worth_trying
 from equimorph.manifold.lookup.near_crossings import NearCrossings
 from equimorph.manifold.lookup.near_cusps import NearCusps, united
-from equimorph.manifold.lookup.rims import Rims, cells_beside, nearest_rims, ways_out
+from equimorph.manifold.lookup.rims import Rims, nearest_rims, ways_out
 from equimorph.model import Constraint, are_feasible
 from equimorph.structures import States, Structure
 from equimorph.tolerances import SAME_SOLUTION, SAME_STATE
@@ -68,6 +68,8 @@ class Sheets:
         Places of the free parameters.
     cells, cell_index, component
         Vertices of the cells, their index, and the pieces that they belong to.
+    whole
+        Facets of the cells, and how they hang together.
     folded, capped
         Whether vertices lie on folds, and on constraints.
     constraints
@@ -81,6 +83,7 @@ class Sheets:
     cells: Cells
     cell_index: CellNumbers
     component: CellNumbers
+    whole: Adjacency
     folded: VertexFlags
     capped: VertexFlags
     constraints: tuple[Constraint, ...]
@@ -124,8 +127,7 @@ class Sheets:
     def _overturned(self) -> CellFlags:
         """Cells that project against the orientation that their index demands."""
         places = self.points.p[:, self.free]
-        whole = adjacency(self.cells)
-        return senses(self.cells, self.cell_index, places, whole).overturned
+        return senses(self.cells, self.cell_index, places, self.whole, self.component).overturned
 
     def over(self, p: Points) -> tuple[States, Items, Items]:
         """States over points (all parameters given), sorted by point; the points; the cells.
@@ -272,9 +274,9 @@ class Sheets:
     @cached_property
     def _rims(self) -> Rims:
         """Bands along folds and constraints, which straight cells miss."""
-        whole = adjacency(self.cells)
+        whole = self.whole
         on = (self.folded | self.capped)[whole.facets].all(axis=1)
-        beside = cells_beside(whole)
+        beside = whole.beside
         index = np.where(beside >= 0, self.cell_index[beside], self.cell_index[beside[:, :1]])
         on &= (whole.counts != 2) | (index != index[:, :1]).any(axis=1)
         return Rims.of(self.points.p[:, self.free], whole, np.flatnonzero(on))

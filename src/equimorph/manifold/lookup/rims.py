@@ -39,7 +39,7 @@ class Rims:
     @classmethod
     def of(cls, x: Places, whole: Adjacency, chosen: Int[np.ndarray, " F"]) -> "Rims":
         """Bands along chosen facets of cells with vertices at x."""
-        facets, beside = whole.facets[chosen], cells_beside(whole)[chosen]
+        facets, beside = whole.facets[chosen], whole.beside[chosen]
         width = np.ptp(x, axis=0) if len(x) else np.ones(x.shape[1])
         unit = x / np.where(width > 0.0, width, 1.0)
         length = _lengths(unit[facets])
@@ -59,16 +59,6 @@ class Rims:
         point = np.repeat(hits.point[close], self.beside.shape[1])
         cell = self.beside[hits.cell[close]].ravel()
         return point[cell >= 0], cell[cell >= 0]
-
-
-def cells_beside(whole: Adjacency) -> Int[np.ndarray, "F most"]:
-    """Cells that have each facet, −1 where there are fewer than of others."""
-    number = whole.cell_facets.ravel()
-    order = np.argsort(number, kind="stable")
-    place = np.arange(len(order)) - np.searchsorted(number[order], number[order])
-    out = np.full((len(whole.facets), int(whole.counts.max(initial=1))), -1)
-    out[number[order], place] = order // whole.cell_facets.shape[1]
-    return out
 
 
 def _lengths(corners: Float[np.ndarray, "F d d"]) -> Float[np.ndarray, " F"]:

@@ -14,7 +14,7 @@ from equimorph.arrays import Facets, Int, ItemFlags, Items
 from equimorph.equilibria import Landing, snap_landing
 from equimorph.errors import InputError
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
-from equimorph.manifold.complex.kept_tables import adjacency_of, from_cache
+from equimorph.manifold.complex.kept_tables import from_cache
 from equimorph.manifold.geometry.topology import facets_of, flags_of, pieces
 from equimorph.model import Progress, Silent
 from equimorph.tolerances import SAME_SOLUTION
@@ -135,7 +135,7 @@ def stability_boundary(eset: EquilibriumSet, stratum: int) -> Facets:
 
 
 def _boundary(eset: EquilibriumSet, stratum: int) -> Facets:
-    whole = adjacency_of(eset)
+    whole = eset.adjacency
     folded = flags_of(whole.facets, facets_of(eset.folds, len(eset.names)))
     a, b = whole.links.T
     side_a, side_b = eset.stratum[a] == stratum, eset.stratum[b] == stratum

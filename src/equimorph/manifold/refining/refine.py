@@ -18,7 +18,7 @@ from equimorph.argument_checks import check_arguments
 from equimorph.arrays import CellFlags, EdgeFlags
 from equimorph.manifold.complex.audit import Audit
 from equimorph.manifold.complex.description import describe_again
-from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
+from equimorph.manifold.complex.equilibrium_set import EquilibriumSet, with_audit
 from equimorph.manifold.complex.excerpts import fabric_of
 from equimorph.manifold.complex.kept_sets import question_of_refinement, recall_set
 from equimorph.manifold.complex.marked_complex import CURVES, Fabric, FacetMark
@@ -263,7 +263,7 @@ def refine_cells(eset: EquilibriumSet, accuracy: float, progress: Progress) -> E
         changed=_topology_change(eset.audit, out.audit),
         smallest_free_angle=smallest_free_angle(fabric),
     )
-    return replace(out, audit=quality)
+    return with_audit(out, quality)
 
 
 def _topology_change(before: Audit, after: Audit) -> int:

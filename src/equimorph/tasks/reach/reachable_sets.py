@@ -12,7 +12,6 @@ from equimorph.arrays import Bool, Float, Int
 from equimorph.errors import InputError
 from equimorph.manifold import Division, EquilibriumSet, divided, part, refine
 from equimorph.manifold.complex.equilibrium_set import check_cells
-from equimorph.manifold.complex.kept_tables import adjacency_of
 from equimorph.manifold.geometry.topology import labels
 from equimorph.model import Constraint, Descriptor
 from equimorph.structures import State, States
@@ -221,7 +220,7 @@ def _pieces_beside_level(cut: Division) -> Int[np.ndarray, " C"]:
 
     The latter matters only where the set could not be cut.
     """
-    whole = adjacency_of(cut.eset)
+    whole = cut.eset.adjacency
     wall = cut.on_level[whole.facets].all(axis=1)[whole.across]
     sides = cut.side[whole.links]
     return labels(len(cut.eset.cells), whole.links[~wall & (sides[:, 0] == sides[:, 1])])

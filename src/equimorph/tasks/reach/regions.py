@@ -10,7 +10,6 @@ import numpy as np
 from equimorph.arrays import Bool, Float, Int
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet, cell_sizes
-from equimorph.manifold.complex.kept_tables import adjacency_of
 from equimorph.manifold.geometry.simplices import volumes
 from equimorph.manifold.geometry.topology import facets_of, flags_of, pieces
 from equimorph.manifold.lookup.cell_index import CellIndex
@@ -165,7 +164,7 @@ def _outer(
     eset: EquilibriumSet, singular: Bool[np.ndarray, " V"]
 ) -> tuple[Int[np.ndarray, "F d"], list[tuple[Kind, str]]]:
     """Facets of one cell, and what each of them lies on."""
-    whole, d = adjacency_of(eset), len(eset.names)
+    whole, d = eset.adjacency, len(eset.names)
     facets = whole.facets[whole.counts == 1]
     folded = flags_of(facets, facets_of(eset.folds, d))
     sides = _sides(eset, facets)
