@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import equimorph as em
+from equimorph.equilibria.box_peaks import BoxPeaks
 from oracles.polynomial import Polynomial
 from oracles.surfaces import integral
 from typecheck import unchecked
@@ -85,6 +86,80 @@ def test_a_square_about_a_target_within_the_box_is_guaranteed_nothing():
     box = size * np.linspace(-1.0, 1.0, 2001)
     best = max(((state(a + box) - state(0.1)) ** 2).min() for a in np.linspace(-1.0, 1.0, 401))
     assert (found.status, found.guaranteed) == ("found", pytest.approx(best, abs=1e-5))
+
+
+def random_robust_question(seed, k):
+    """A random sheet, and a square about a target with a box of errors, in turn min and max."""
+    rng = np.random.default_rng(1000 + seed)
+    structure, state = random_sheet(rng, k)
+    target, sizes = float(state(*rng.uniform(-0.7, 0.7, k))), rng.uniform(0.1, 0.5, k)
+    with unchecked():
+        box = em.Box(**dict.fromkeys(("a", "b")[:k], (-1.0, 1.0)))
+        intervals = {1: (24,), 2: (12, 12)}[k]
+        eset = em.equilibrium_set(structure, box, intervals=intervals, checks=0)
+    offsets = dict(zip(("a", "b")[:k], sizes.tolist(), strict=True))
+    sense, sign = (("min", 1.0), ("max", -1.0))[seed % 2]
+    own = squared(structure, target)
+
+    def worst(points, count):
+        """Worst case at each of some points, by a scan of its box."""
+        mesh = points[:, :, None] + sizes[:, None] * scan(k, count)
+        return (sign * (state(*mesh.swapaxes(0, 1)) - target) ** 2).max(axis=1)
+
+    return eset, own, offsets, (sense, sign), worst
+
+
+@pytest.mark.parametrize(
+    "seed, k", [(118, 1), (102, 1), (115, 1), (116, 1), (109, 1), (8, 2), (3, 2)]
+)
+def test_no_state_of_a_scan_is_better_in_its_worst_case(seed, k):
+    """In 118 and 8 the worst case dips between two vertices that are on a plateau."""
+    eset, own, offsets, (sense, sign), worst = random_robust_question(seed, k)
+    with unchecked():
+        found = em.robust_optimum(eset, own, offsets, sense=sense)
+    scanned = worst(scan(k, {1: 801, 2: 61}[k]).T, {1: 401, 2: 21}[k])
+    assert found.status == "found"
+    assert sign * found.guaranteed <= scanned.min() + 3e-4 * abs(scanned.min())
+    # what is guaranteed is the worst case there, and so is what the nominal state risks
+    for state, value in ((found.state, found.guaranteed), (found.nominal.state, found.at_risk)):
+        here = worst(state.p[None, :k], {1: 20001, 2: 401}[k])[0]
+        assert here <= sign * value + 1e-9
+        assert sign * value <= here + 1e-3 * max(abs(here), 1e-3)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_the_first_search_knows_the_corners_alone(seed):
+    """With no lattice the worst case is the largest value of middle and corners, as in `scan`."""
+    rng = np.random.default_rng(seed)
+    k = 1 + seed % 3
+    structure, state = random_sheet(rng, k)
+    own, sizes = squared(structure, 0.3), rng.uniform(0.1, 0.5, k)
+    places, centres = np.arange(k), rng.uniform(-0.5, 0.5, (4, k))
+    q = centres[:, :, None] + sizes[:, None] * np.hstack([np.zeros((k, 1)), scan(k, 2)])
+    expected = (state(*q.swapaxes(0, 1)) - 0.3) ** 2
+    with unchecked():
+        box = BoxPeaks(structure, own, places, sizes, 1.0, 0)
+        values, offsets = box.over(state(*centres.T)[:, None], centres)
+    assert values == pytest.approx(expected, abs=1e-10)
+    assert centres[:, :, None] + sizes[:, None] * offsets.swapaxes(1, 2) == pytest.approx(q)
+
+
+@pytest.mark.parametrize("height, stable", [(0.999, False), (1.001, True)])
+def test_what_is_at_risk_counts_stability_that_is_lost_between_lattice_points(height, stable):
+    """x² = a² + b² − 1: the box below (a, b) touches the unit disc between points of the lattice."""
+    structure = Polynomial(lambda x, a, b: integral(x**2 - a**2 - b**2 + 1.0), 1, ("a", "b"))
+    place = {"a": 0.05625, "b": height + 0.3}
+    gap = em.Descriptor(
+        "gap", "1", lambda z, p: ((p[:, :2] - list(place.values())) ** 2).sum(axis=1), "g",
+        structure.signature,
+    )  # fmt: skip
+    with unchecked():
+        box = em.Box(a=(-2.0, 2.0), b=(0.2, 2.0))
+        eset = em.equilibrium_set(structure, box, intervals=(24, 16), checks=0)
+        found = em.robust_optimum(eset, gap, {"a": 0.45, "b": 0.3})
+    assert found.nominal.state.p[:2] == pytest.approx(list(place.values()), abs=1e-5)
+    assert np.isfinite(found.at_risk) == stable
+    assert found.state["b"] - 0.3 >= 1.0 - 1e-6
 
 
 @pytest.mark.parametrize("least", [0.0883, 0.3033])

@@ -16,6 +16,7 @@ from equimorph.model import Constraint, Descriptor, Schedule
 from equimorph.structures import State, States, join_states
 from equimorph.tasks.distances import distinct
 from equimorph.tasks.optimising.certificates import Certificate, certificate
+from equimorph.tasks.optimising.dips import vertices_beside_dips
 from equimorph.tasks.optimising.feasible_starts import (
     FeasibleStarts,
     feasible_points_in_cells,
@@ -281,14 +282,17 @@ def _starts_around(ground: EquilibriumSet | None, programme: Programme, start: S
 def _best_vertices(
     eset: EquilibriumSet, programme: Programme, allowed: Bool[np.ndarray, " V"]
 ) -> SetPoints:
-    """Allowed vertices that no allowed neighbour beats, the best first."""
+    """Allowed vertices that no allowed neighbour beats, the best first, or beside narrow dips."""
     goal = programme.objective
     value = goal.sign * stable_values(eset, goal.descriptor)
     edges = stable_edges(eset)
     edges = edges[allowed[edges].all(axis=1)]
     alone = np.setdiff1d(np.flatnonzero(allowed), edges)
     both = np.concatenate([local_minima(edges, value), alone])
-    return points_at_vertices(eset, both[np.argsort(value[both], kind="stable")][:CANDIDATES])
+    best = both[np.argsort(value[both], kind="stable")][:CANDIDATES]
+    if goal.kinked:
+        best = np.concatenate([best, vertices_beside_dips(eset, programme, allowed, value, best)])
+    return points_at_vertices(eset, best)
 
 
 def _optima(programme: Programme, ends: list[CriticalPoint]) -> list[CriticalPoint]:

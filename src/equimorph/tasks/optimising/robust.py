@@ -46,7 +46,9 @@ class RobustOptimum:
     Parameters
     ----------
     status
-        "found"; "refused" with the reason in `why`; or "not converged": the worst case is that of
+        "found": nothing worse was found in the box around the state, and no better state, from the
+        vertices of the set and from dips between them that their slopes show; "refused" with the
+        reason in `why`; or "not converged": the worst case is that of
         the state, but after all exchanges the box still held what the search for the state had
         overlooked, so that others may be better.
     offsets
@@ -200,7 +202,7 @@ def robust_optimum(
         question = judged.further
     assert kept is not None
     sign, end = (1.0 if sense == "min" else -1.0), kept.end
-    at_risk = question.judge.worst(nominal.best.state)
+    at_risk = _worst_around(question.judge, nominal.best.state)
     return RobustOptimum(
         "not converged" if kept.why else "found", kept.why, sense, dict(offsets), nominal.best,
         end.state, objective(end.state), sign * kept.worst, sign * at_risk, end.edge,
@@ -264,6 +266,12 @@ class _Judged:
     worst: float
     why: str
     further: _Question
+
+
+def _worst_around(question: _Question, state: State) -> float:
+    """Worst case over the box around a state, ∞ where a way through its sides is not stable."""
+    share, _ = least_room(state, question.offsets)
+    return np.inf if share < 1.0 else question.worst(state)
 
 
 def _judge(question: _Question, best: "_End") -> _Judged:
