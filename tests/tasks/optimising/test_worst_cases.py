@@ -110,7 +110,7 @@ def random_robust_question(seed, k):
 
 
 @pytest.mark.parametrize(
-    "seed, k", [(118, 1), (102, 1), (115, 1), (116, 1), (109, 1), (8, 2), (3, 2)]
+    ("seed", "k"), [(118, 1), (102, 1), (115, 1), (116, 1), (109, 1), (8, 2), (3, 2)]
 )
 def test_no_state_of_a_scan_is_better_in_its_worst_case(seed, k):
     """In 118 and 8 the worst case dips between two vertices that are on a plateau."""
@@ -144,9 +144,9 @@ def test_the_first_search_knows_the_corners_alone(seed):
     assert centres[:, :, None] + sizes[:, None] * offsets.swapaxes(1, 2) == pytest.approx(q)
 
 
-@pytest.mark.parametrize("height, stable", [(0.999, False), (1.001, True)])
+@pytest.mark.parametrize(("height", "stable"), [(0.999, False), (1.001, True)])
 def test_what_is_at_risk_counts_stability_that_is_lost_between_lattice_points(height, stable):
-    """x² = a² + b² − 1: the box below (a, b) touches the unit disc between points of the lattice."""
+    """x² = a² + b² − 1: the box meets the unit disc between points of the lattice."""
     structure = Polynomial(lambda x, a, b: integral(x**2 - a**2 - b**2 + 1.0), 1, ("a", "b"))
     place = {"a": 0.05625, "b": height + 0.3}
     gap = em.Descriptor(
