@@ -195,12 +195,13 @@ def settle(
     The points and a status for each lane: one that fails leaves the others as they are.
     """
     guards = Guards() if guards is None else guards
-    if directions is None and not conditions and guards.known is None:
-        return _apply_guards(structure, _at_parameters(structure, z, p, guards), z, p, guards)
     frame = Tangents() if frame is None else frame
+    held = directions is None
     if directions is None:
         directions = np.zeros((len(z), 0, p.shape[1]))
     problem = Problem(structure, directions, tuple(conditions), frame)
+    if held and not conditions and problem.width == 0 and guards.known is None:
+        return _apply_guards(structure, _at_parameters(structure, z, p, guards), z, p, guards)
     if problem.in_one_plane and guards.known is None:
         return _apply_guards(structure, _in_one_plane(problem, z, p, guards), z, p, guards)
     return _apply_guards(structure, _by_steps(problem, z, p, guards, frames=frames), z, p, guards)

@@ -33,8 +33,7 @@ from equimorph.columns import Columns
 from equimorph.equilibria.critical import Critical, null_border
 from equimorph.equilibria.hidden_events import multiplicity
 from equimorph.equilibria.newton_step import Planes
-from equimorph.equilibria.point_conditions import Plane
-from equimorph.equilibria.settle import Guards, lower_index, settle
+from equimorph.equilibria.settle import Guards, Settled, lower_index, settle
 from equimorph.manifold.geometry.exact_points import Aim, Pinned, correct_points
 from equimorph.manifold.geometry.setting import Setting, embed
 from equimorph.manifold.geometry.simplices import shares_in
@@ -260,27 +259,24 @@ class NearCrossings:
     def _along(
         self, centres: Centres, p: Parameters, s: Values
     ) -> tuple[Lanes, Values, Values, Flags]:
-        """See `at_amplitudes`."""
-        own = centres.z, centres.p, centres.b
-        return at_amplitudes(self.setting.structure, own, p, s)
+        """Points with amplitudes s, r and its slope, and which were found; see `at_amplitudes`."""
+        structure = self.setting.structure
+        v = Critical(structure, centres.z, centres.p, centres.b).v
+        found, there = at_amplitudes(structure, centres.b, p, centres.z + s[:, None] * v)
+        return found.z, -found.unfolding, -there.g, found.found
 
 
 def at_amplitudes(
-    structure: Structure, centres: tuple[Lanes, Parameters, Lanes], p: Parameters, s: Values
-) -> tuple[Lanes, Values, Values, Flags]:
-    """Points with amplitudes s from centres over p, r and its slope, and which could be found.
+    structure: Structure, b: Lanes, p: Parameters, guess: Lanes
+) -> tuple[Settled, Critical]:
+    """Points z over p with the amplitudes ``b·z`` of guesses and r, which is minus `unfolding`.
 
-    centres: nearly singular points z₀, their parameters, and borders.
+    Beside them their null vectors v, with b·v = 1, and g, which is minus dr/ds.
     """
-    at, b = centres[0], centres[2]
-    v = Critical(structure, *centres).v
-    rows, still = b[:, None], np.zeros((len(b), 1, p.shape[1]))
-    amplitude = Plane(at + s[:, None] * b, p, rows, still)
-    frame = Planes(rows, still, np.zeros((len(b), 1)), b)
-    z = at + s[:, None] * v
-    found = settle(structure, z, p, None, (amplitude,), GUARDS, frame, frames=False)
-    slope = -Critical(structure, found.z, p, b).g
-    return found.z, -found.unfolding, slope, found.found
+    still = np.zeros((len(b), 1, p.shape[1]))
+    frame = Planes(b[:, None], still, np.zeros((len(b), 1)), b)
+    found = settle(structure, guess, p, None, (), GUARDS, frame, frames=False)
+    return found, Critical(structure, found.z, p, b)
 
 
 def of_set(

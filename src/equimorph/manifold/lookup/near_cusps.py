@@ -14,6 +14,7 @@ from equimorph.arrays import (
     Bool,
     CellNumbers,
     Facets,
+    Flags,
     Float,
     Int,
     Items,
@@ -24,7 +25,7 @@ from equimorph.arrays import (
     Values,
 )
 from equimorph.columns import Columns
-from equimorph.equilibria.critical import null_border, null_vectors
+from equimorph.equilibria.critical import Critical, null_border, null_vectors
 from equimorph.equilibria.locus import Locus, nearest
 from equimorph.manifold.geometry.setting import Setting, embed
 from equimorph.manifold.geometry.topology import Adjacency, keys_of
@@ -45,8 +46,8 @@ cubics between two of them have its roots, which are closer together the closer 
 BISECTIONS = 40
 """Bisections of a cubic where it is monotone."""
 CORRECTIONS, EXACT = 6, 1e-9
-"""Newton's steps in the amplitude of a root, and the last one, in reaches, up to which it is one: z
-belongs to the amplitude before it. Newton's method in z itself stops above round-off here."""
+"""Newton's steps in the amplitude of a root, and the last one, in reaches, up to which it is one:
+Newton's method in z itself stops above round-off here."""
 REACH = 2.5
 """Amplitudes are examined up to that of the farthest corner times this number: where one of three
 roots of a cubic is double, the third one is twice as far from the cusp on the other side."""
@@ -61,7 +62,7 @@ AT_CUSP = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class NearCusps(Columns):
-    """Cusps, their borders and largest amplitudes, and the parameters around them.
+    """Cusps, their borders, null vectors and largest amplitudes, and the parameters around them.
 
     beside: cells that have the facet, −1 where there are fewer than of others.
     """
@@ -69,6 +70,7 @@ class NearCusps(Columns):
     z: Lanes
     p: Parameters
     b: Lanes
+    v: Lanes
     reach: Values
     lower: Float[np.ndarray, "lanes d"]
     upper: Float[np.ndarray, "lanes d"]
@@ -81,24 +83,50 @@ class NearCusps(Columns):
         """
         within = (x[:, None] >= self.lower) & (x[:, None] <= self.upper)
         point, cusp = np.nonzero(within.all(axis=2))
-        many, own = np.repeat(np.arange(len(point)), len(SHARES)), self.take(cusp)
-        s = (own.reach[:, None] * SHARES).ravel()
-        at = own.take(many)
-        _, *nodes = at_amplitudes(structure, (at.z, at.p, at.b), p[point[many]], s)
-        lane, root = _roots(*(each.reshape(len(point), len(SHARES)) for each in (s, *nodes)))
+        if len(point) == 0:
+            return np.zeros_like(self.z[:0]), point, point
+        own, nodes = self.take(cusp), len(SHARES)
+        s = own.reach[:, None] * SHARES
+        guess = own.z[:, None] + s[:, :, None] * own.v[:, None]
+        many = np.repeat(np.arange(len(point)), nodes)
+        guess = guess.reshape(-1, guess.shape[2])
+        found, there = at_amplitudes(structure, own.b[many], p[point[many]], guess)
+        shape = s.shape
+        of_nodes = -found.unfolding.reshape(shape), -there.g.reshape(shape)
+        lane, node, root = _roots(s, *of_nodes, found.found.reshape(shape))
+        row = lane * nodes + node
+        guess = found.z[row] + (root - s[lane, node])[:, None] * there.v[row]
         own, point = own.take(lane), point[lane]
-        for _ in range(CORRECTIONS):
-            z, r, slope, good = at_amplitudes(structure, (own.z, own.p, own.b), p[point], root)
-            with np.errstate(divide="ignore", invalid="ignore"):
-                step = np.nan_to_num(r / slope, nan=np.inf)
-            root = root - np.clip(step, -own.reach, own.reach)
-        good &= np.abs(step) <= EXACT * own.reach
+        z, exact = _corrected(structure, own, p[point], root, guess)
         of_state = structure.index(z, p[point])
         beside = own.beside
         same = (index[beside] == of_state[:, None]) & (beside >= 0)
-        good &= same.any(axis=1)
+        good = exact & same.any(axis=1)
         cell = beside[np.arange(len(z)), same.argmax(axis=1)]
         return z[good], point[good], cell[good]
+
+
+def _corrected(
+    structure: Structure, own: NearCusps, p: Points, root: Values, guess: Lanes
+) -> tuple[Lanes, Flags]:
+    """States near guesses with given amplitudes, by Newton's method for r = 0; which are exact."""
+    z, root, good = guess.copy(), root.copy(), np.zeros(len(guess), bool)
+    left = np.arange(len(z))
+    for _ in range(CORRECTIONS):
+        if len(left) == 0:
+            break
+        at = own.take(left)
+        found, there = at_amplitudes(structure, at.b, p[left], z[left])
+        with np.errstate(divide="ignore", invalid="ignore"):
+            step = np.nan_to_num(found.unfolding / there.g, nan=np.inf)
+        good[left] = found.found & (np.abs(step) <= EXACT * at.reach)
+        step = np.clip(step, -at.reach, at.reach)
+        root[left] -= step
+        along = found.z - step[:, None] * there.v
+        afresh = at.z + root[left, None] * at.v
+        z[left] = np.where(found.found[:, None], along, afresh)
+        left = left[~good[left]]
+    return z, good
 
 
 def _roots(
@@ -106,8 +134,8 @@ def _roots(
     r: Float[np.ndarray, "lanes nodes"],
     slope: Float[np.ndarray, "lanes nodes"],
     good: Bool[np.ndarray, "lanes nodes"],
-) -> tuple[Items, ItemValues]:
-    """Lanes and amplitudes at which cubics between good nodes vanish."""
+) -> tuple[Items, Items, ItemValues]:
+    """Lanes and amplitudes at which cubics between good nodes vanish; the nodes before them."""
     step = np.diff(s, axis=1)
     first, last, rise = slope[:, :-1] * step, slope[:, 1:] * step, np.diff(r, axis=1)
     cubic = np.stack([r[:, :-1], first, 3 * rise - 2 * first - last, first + last - 2 * rise], -1)
@@ -127,7 +155,7 @@ def _roots(
         t = 0.5 * (low + high)
         before = sign * np.einsum("nk,nk->n", own, t[:, None] ** np.arange(4)) > 0.0
         low, high = np.where(before, t, low), np.where(before, high, t)
-    return lane, s[lane, node] + low * step[lane, node]
+    return lane, node, s[lane, node] + low * step[lane, node]
 
 
 def united(structure: Structure, parts: list[Found]) -> Found:
@@ -171,7 +199,8 @@ def cusps_near(
     margin = AROUND * ((upper - lower) / setting.scales).max(axis=1)[:, None] * setting.scales
     keys, wanted = (keys_of(each, len(points)) for each in (whole.facets, facets))
     beside = whole.beside[np.searchsorted(keys, wanted)]
-    return NearCusps(z, p, b, reach, lower - margin, upper + margin, beside)
+    v = Critical(structure, z, p, b).v
+    return NearCusps(z, p, b, v, reach, lower - margin, upper + margin, beside)
 
 
 def _turning(points: States, facets: Facets) -> Some:
