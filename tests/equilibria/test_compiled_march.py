@@ -7,9 +7,10 @@ import pytest
 
 import equimorph as em
 from equimorph.equilibria import ParameterLine, TraceOptions, Traces, trace
+from equimorph.equilibria.rare_steps import RareSteps
 from equimorph.equilibria.trace import Batching
 from equimorph.errors import InputError
-from equimorph.structures import States
+from equimorph.structures import Advance, States
 from equimorph.structures.rod import Rod
 
 
@@ -90,6 +91,33 @@ def test_results_of_compiled_loops_do_not_depend_on_the_batch(starts: States, ca
     whole = trace(curve, some.z)
     parts = trace(curve, some.z, batching=Batching(capacity=capacity, threads=1))
     for one, other in zip(_columns(whole), _columns(parts), strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+def test_steps_that_wait_to_be_judged_end_like_those_that_are_judged_alone(
+    monkeypatch: pytest.MonkeyPatch,
+):
+    """Symmetric arches pass a branch point each; in large blocks more are judged at once."""
+    arch, p = em.Rod(load="uniform"), np.zeros((64, 4))
+    p[:, 0], p[:, 1], p[:, 3] = np.linspace(0.85, 1.0, 64), 0.0, np.sin(1.0)
+    starts, _ = arch.natural_states(p)
+    curve = ParameterLine(arch, p, np.tile([0.0, 0.0, 20.0, 0.0], (64, 1)))
+    within, options = (arch.max_curvature <= 20,), TraceOptions(**THROUGH)
+    calls, judge = [0], RareSteps.judge
+
+    def count(rare: RareSteps, move: Advance) -> None:
+        calls[0] += 1
+        judge(rare, move)
+
+    monkeypatch.setattr(RareSteps, "judge", count)
+    found, judgements = [], []
+    for capacity in (1, 128):
+        calls[0] = 0
+        batching = Batching(capacity=capacity, threads=1)
+        found.append(_columns(trace(curve, starts.z, within, options, batching=batching)))
+        judgements.append(calls[0])
+    assert judgements[0] > 4 * judgements[1] > 0
+    for one, other in zip(*found, strict=True):
         np.testing.assert_array_equal(one, other)
 
 

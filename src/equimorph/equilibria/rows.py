@@ -35,7 +35,7 @@ class Rows:
         self.numbers, self.counts = new_scalars(_apart(rows))
         self.values = np.zeros((3 * constraints, rows))
         self.grazing = np.zeros((constraints, rows), bool)
-        self.state = np.zeros(5, np.int64)
+        self.state = np.zeros(6, np.int64)
         self.events = EventFile(size, events + rows, self.state)
         self.points = PointFile(size, rows if options.record else 0, self.state)
 

@@ -13,10 +13,13 @@ from equimorph.marching.event_kernels import file_events, file_points
 from equimorph.marching.kernels import (
     ACCEPTED,
     ARC,
+    BRANCH,
     CONSTRAINT,
     CONVERGED,
     CORNER,
     DEFECT,
+    EARLY,
+    HIDDEN,
     LANE,
     LENGTH,
     NEARLY,
@@ -24,6 +27,7 @@ from equimorph.marching.kernels import (
     STARTING,
     SUMS,
     TRIAL,
+    WAITS,
     WHAT,
     close_gaps,
     correct,
@@ -32,9 +36,9 @@ from equimorph.marching.kernels import (
 )
 from equimorph.marching.step_kernels import enter, proceed
 
-PHASE, ACTIVE, WAITING, EVENTS, POINTS = range(5)
+PHASE, ACTIVE, WAITING, EVENTS, POINTS, SPENT = range(6)
 """Entries of `state`: where in a tick; lanes on their way; how many of those that waited have
-entered; steps with events, and points, that are filed."""
+entered; steps with events, and points, that are filed; steps that lanes spent waiting."""
 STEP, CORRECT, FINISH, CLOSE = range(4)
 """Parts of a tick: Newton step; correction, judgement and constraints; files and the next
 prediction; closing of gaps."""
@@ -43,6 +47,8 @@ IDLE, UNSAFE, RARE, LOST = range(4)
 doubtful, may hide something or graze a constraint; lanes are given up."""
 LAST, HERE, NEW = range(3)
 """Rows of the values of each constraint: at the step before, here, and at the end of the step."""
+PATIENCE = 1000
+"""Steps that lanes with rare steps may spend waiting for others: as long as judging them takes."""
 ENOUGH = 4
 """Reciprocal share of free rows from which on more lanes are asked for."""
 
@@ -179,6 +185,44 @@ def any_below(ratio, active, least):
 
 
 @njit(**{**FLAGS, "_nrt": False})
+def _pass_over(counts, active, ratio):
+    """Call the steps of lanes that wait safe: nobody looks at them."""
+    for i in range(active):
+        if counts[STAGE, i] == WAITS:
+            ratio[i] = np.inf
+
+
+@njit(**{**FLAGS, "_nrt": False})
+def _assemble(tangent, row, counts, grazing, state, locates):
+    """Let rare steps wait for others; whether all that wait are to be judged now.
+
+    That is so as soon as waiting has cost as much as judging will, or no lane is left to wait for.
+    Tangents wait in the rows of closing equations, which lanes get anew after their judgement.
+    """
+    waiting, active = 0, state[ACTIVE]
+    for i in range(active):
+        if counts[STAGE, i] == CONVERGED:
+            rare = locates and (counts[WHAT, i] & (BRANCH | HIDDEN | EARLY)) != 0
+            for k in range(grazing.shape[0]):
+                rare = rare or grazing[k, i]
+            if rare:
+                counts[STAGE, i] = WAITS
+                for j in range(row.shape[1]):
+                    row[i, j] = tangent[i, j]
+        waiting += counts[STAGE, i] == WAITS
+    state[SPENT] += waiting
+    if waiting == 0 or (waiting < active and state[SPENT] < PATIENCE):
+        return False
+    state[SPENT] = 0
+    for i in range(active):
+        if counts[STAGE, i] == WAITS:
+            counts[STAGE, i] = CONVERGED
+            for j in range(row.shape[1]):
+                tangent[i, j] = row[i, j]
+    return True
+
+
+@njit(**{**FLAGS, "_nrt": False})
 def _is_idle(state, lanes, files, rows, limits):
     """Whether no lane is left, files are full, or more lanes are wanted and may be there."""
     most_events, more, records = limits
@@ -204,10 +248,10 @@ def march_of(step, excess):
 
     @template(**FLAGS)
     def measure(work, tables, bounds, line, block, scratch):
-        """Values of constraints at starts and ends of good steps; how many steps may graze one."""
+        """Values of constraints at starts and ends of good steps; which steps may graze one."""
         places, _, numbers, counts, values, grazing, state = block
         if grazing.shape[0] == 0:
-            return 0
+            return
         _, _, z, p, at, found = scratch
         count = gather(line, places[2], numbers, counts, state[ACTIVE], z, p, at)
         if count > 0:
@@ -215,14 +259,14 @@ def march_of(step, excess):
             for k in range(grazing.shape[0]):
                 for i in range(count):
                     values[3 * k + NEW, at[i]] = found[k, i]
-        return note_excess(values, numbers, counts, state[ACTIVE], grazing)
+        note_excess(values, numbers, counts, state[ACTIVE], grazing)
 
     @template(**FLAGS)
     def march(work, tables, bounds, problem, queue, block, move, files, scratch, rules):
         """March until nothing is left that is compiled; return why."""
         line, weight, mass, knobs, start, guard = problem
         lanes, levels, most_events, more = queue
-        places, flat, numbers, counts, values, _, state = block
+        places, flat, numbers, counts, values, grazing, state = block
         dz, dt, tangent, slope, residual, index, determinant, ratio = move
         step_of = (dz, tangent, slope, index, determinant)
         _, _, trial, row = places
@@ -242,6 +286,7 @@ def march_of(step, excess):
                     index[:n], determinant[:n], ratio[:n],
                 )  # fmt: skip
                 state[PHASE] = CORRECT
+                _pass_over(counts, active, ratio)
                 if any_below(ratio, active, guard):
                     return UNSAFE
             active = state[ACTIVE]
@@ -249,12 +294,11 @@ def march_of(step, excess):
                 around = mass, trial, numbers, counts, active
                 correct(dz, dt, tangent, slope, *around, ACCEPTED, NEARLY)
                 correct_arrivals(dz, tangent, slope, mass, places, numbers, counts, active)
-                _, doubtful, close = judge(
-                    index, determinant, numbers, counts, active, smallest, locates, plain
-                )
-                rare = measure(work, tables, bounds, line, block, scratch)
+                judge(index, determinant, numbers, counts, active, smallest, locates, plain)
+                measure(work, tables, bounds, line, block, scratch)
                 state[PHASE] = FINISH
-                if rare > 0 or (locates and doubtful + close > 0):
+                if _assemble(tangent, row, counts, grazing, state, locates):
+                    note_excess(values, numbers, counts, active, grazing)
                     return RARE
             if state[PHASE] == FINISH:
                 _, given_up = finish(
