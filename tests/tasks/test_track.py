@@ -75,6 +75,59 @@ def test_curves_are_missed_between_rows_by_their_bend_too(start):
     assert found.between[ANGLE.name] == pytest.approx(max(misses), rel=1e-6)
 
 
+def largest_miss(delta, x_l, wanted):
+    """Largest miss of δ half-way between rows, where x_l is the mean of two."""
+    misses = [0.0]
+    for a, b, x, d in zip(delta[:-1], delta[1:], 0.5 * (x_l[:-1] + x_l[1:]), wanted, strict=True):
+        low, high = sorted((a, b))
+        root = brentq(lambda d, x=x: (1 - x / np.cos(d)) * np.sin(d) - LOAD, low, high, xtol=1e-15)
+        misses.append(abs(root - d))
+    return max(misses)
+
+
+@pytest.mark.parametrize("accuracy", [1e-4, 1e-6, 1e-8])
+@pytest.mark.parametrize(
+    ("targets", "wanted"),
+    [
+        ({ANGLE: 0.30}, lambda t: 0.62 - 0.32 * t),
+        ([{ANGLE: 0.40}, {ANGLE: 0.75}], lambda t: np.interp(t, [0, 1, 2], [0.62, 0.40, 0.75])),
+        (lambda t: {ANGLE: 0.62 - 0.3 * t**2}, lambda t: 0.62 - 0.3 * t**2),
+    ],
+)
+def test_rows_are_inserted_until_an_accuracy_holds(start, targets, wanted, accuracy):
+    """All rows meet the closed form, half-way they miss it by no more, and rows are few."""
+    coarse = em.track(start, targets, actuators=["x_l"])
+    found = em.track(start, targets, actuators=["x_l"], accuracy=accuracy)
+    at, delta, x_l = found.path.at, found.values[ANGLE.name], found.schedule.values[:, 0]
+    assert found.arrived
+    assert (np.diff(at) > 0.0).all()
+    assert delta == pytest.approx(wanted(at), abs=1e-9)
+    assert x_l == pytest.approx([support(d, LOAD) for d in delta], abs=1e-9)
+    miss = largest_miss(delta, x_l, wanted(0.5 * (at[:-1] + at[1:])))
+    assert miss <= accuracy * (1.0 + 1e-6)
+    assert found.between[ANGLE.name] == pytest.approx(miss, rel=1e-5, abs=1e-14)
+    # halving a row divides its miss by four
+    most = np.sqrt(max(coarse.between[ANGLE.name] / accuracy, 1.0))
+    assert len(at) <= len(coarse.path.at) * max(1.0, 2.0 * most)
+
+
+def test_an_accuracy_below_round_off_is_refused_by_name(start, monkeypatch):
+    monkeypatch.setattr("equimorph.tasks.motion.between_rows.MOST_ROWS", 500)
+    found = em.track(start, {ANGLE: 0.40}, actuators=["x_l"], accuracy=1e-12)
+    assert (found.status, found.failure, found.schedule) == ("refused", "accuracy", None)
+    assert "rows the targets are missed by" in found.why
+    assert len(found.path.at) <= 500
+
+
+def test_spare_actuators_get_further_rows_too(start):
+    """With x_l and F free the rows in between are the nearest states that meet the target."""
+    found = em.track(start, {ANGLE: 0.45}, actuators=["x_l", "F"], accuracy=1e-8)
+    assert found.arrived
+    assert found.between[ANGLE.name] <= 1e-8
+    delta, (x_l, force) = found.values[ANGLE.name], found.schedule.values[:, :2].T
+    assert (1 - x_l / np.cos(delta)) * np.sin(delta) == pytest.approx(force, abs=1e-9)
+
+
 def test_angle_beyond_the_stability_boundary_is_a_snap(start):
     """cos³ δ = x_l is met at (0.2165, 0.9316): sin³ δ = F/k."""
     found = em.track(start, {ANGLE: -0.62}, actuators=["x_l"])

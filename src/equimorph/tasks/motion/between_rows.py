@@ -1,37 +1,131 @@
 """How far targets are missed between the rows of a schedule, where parameters move straight on."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from equimorph.arrays import Float, Int
+from equimorph.arrays import Float, Int, Lanes, Parameters, Some
 from equimorph.equilibria import Leg, Path
+from equimorph.equilibria.settle import distances
 from equimorph.manifold.lookup.exact_states import exact_states
-from equimorph.model import Descriptor
+from equimorph.model import Constraint, Descriptor, are_feasible
 from equimorph.structures import States
+from equimorph.tasks.distances import path_lengths
+from equimorph.tasks.motion.course import EXACT, Course, correct_onto_targets
+from equimorph.tasks.route import describe_place
+
+MOST_ROWS = 20_000
+"""Rows of a schedule beyond which none is inserted."""
+SURE = 0.5
+"""First correction of a state half-way between rows, relative to the way between these, up to which
+it is on their branch."""
 
 
-def misses_between(
-    path: Path, legs: Sequence[Leg], descriptors: tuple[Descriptor, ...]
-) -> dict[str, float]:
-    """Largest misses half-way between successive states of a path, by the descriptors' names.
+@dataclass(frozen=True)
+class BetweenRows:
+    """A motion whose rows meet targets, and what happens half-way between the rows.
 
-    There the parameters are the means of those of both states. Where no stable state is found from
-    the mean of both, the miss is infinite.
+    Parameters
+    ----------
+    path
+        The exact states of the rows.
+    legs, descriptors, actuators
+        Targets, what has targets, and the parameters that are solved for.
+    within
+        Constraints to obey.
     """
-    states, at = path.states, path.at
-    first, last = states[:-1], states[1:]
-    p = 0.5 * (first.p + last.p)
-    z, good, index = exact_states(states.structure, 0.5 * (first.z + last.z), p)
-    here = States(states.structure, z, p)
-    middle = 0.5 * (at[:-1] + at[1:])
-    leg = np.minimum(middle.astype(int), len(legs) - 1)
-    out = {}
-    for each in descriptors:
-        wanted = _targets(each, legs, leg, middle - leg, 0.5 * (each(first) + each(last)))
-        gap = np.where(good & (index == 0), np.abs(each(here) - wanted), np.inf)
-        out[each.name] = float(np.nan_to_num(gap, nan=0.0).max(initial=0.0))
-    return out
+
+    path: Path
+    legs: Sequence[Leg]
+    descriptors: tuple[Descriptor, ...]
+    actuators: tuple[str, ...]
+    within: tuple[Constraint, ...]
+
+    @property
+    def largest(self) -> dict[str, float]:
+        """Largest misses of the targets, by the descriptors' names; see `misses`."""
+        most = self.misses().max(axis=0, initial=0.0)
+        names = (each.name for each in self.descriptors)
+        return dict(zip(names, most.tolist(), strict=True))
+
+    def misses(self) -> Float[np.ndarray, "rows m"]:
+        """Misses half-way between successive rows, where the parameters are the means of both.
+
+        Where no stable state is found from the mean of both, the miss is infinite.
+        """
+        states = self.path.states
+        first, last, (z, p) = states[:-1], states[1:], self._means()
+        z, good, index = exact_states(states.structure, z, p)
+        here = States(states.structure, z, p)
+        leg, share = self._places()
+        out = np.zeros((len(p), len(self.descriptors)))
+        for column, each in zip(out.T, self.descriptors, strict=True):
+            wanted = _targets(each, self.legs, leg, share, 0.5 * (each(first) + each(last)))
+            gap = np.where(good & (index == 0), np.abs(each(here) - wanted), np.inf)
+            column[:] = np.nan_to_num(gap, nan=0.0, posinf=np.inf)
+        return out
+
+    def refined(self, accuracy: float) -> tuple["BetweenRows", str]:
+        """Insert rows half-way until all misses are small enough; why they do not become so."""
+        here = self
+        while True:
+            misses = here.misses().max(axis=1, initial=0.0)
+            coarse, rows = np.flatnonzero(misses > accuracy), len(here.path.at)
+            if not len(coarse):
+                return here, ""
+            if rows + len(coarse) > MOST_ROWS:
+                why = f"between {rows} rows the targets are missed by {misses.max():.3g}"
+                return here, f"{why}, not {accuracy:.3g} at most"
+            middle, found = here._on_targets(coarse)
+            if not found.all():
+                lost = here.path.states[int(coarse[np.argmin(found)])]
+                place = describe_place(lost, here.actuators)
+                return here, f"no further row within the constraints is found behind {place}"
+            here = here._with_rows(coarse, middle)
+
+    def _means(self) -> tuple[Lanes, Parameters]:
+        states = self.path.states
+        return 0.5 * (states.z[:-1] + states.z[1:]), 0.5 * (states.p[:-1] + states.p[1:])
+
+    def _places(self) -> tuple[Int[np.ndarray, " rows"], Float[np.ndarray, " rows"]]:
+        """Legs half-way between rows, and the shares of these."""
+        at = self.path.at
+        middle = 0.5 * (at[:-1] + at[1:])
+        leg = np.minimum(middle.astype(int), len(self.legs) - 1)
+        return leg, middle - leg
+
+    def _on_targets(self, rows: Some) -> tuple[States, np.ndarray]:
+        """Exact states that meet the targets half-way behind rows, and which were found."""
+        states, (z, p), (leg, share) = self.path.states, self._means(), self._places()
+        structure, found = states.structure, np.zeros(len(rows), bool)
+        z, p, leg, share = z[rows], p[rows], leg[rows], share[rows]
+        ways = distances(structure, states.z[rows], states.p[rows], z, p)
+        for number in np.unique(leg).tolist():
+            own = np.flatnonzero(leg == number)
+            begin = states[int(np.searchsorted(self.path.at, number))]
+            course = Course.of(begin, [self.legs[number]], self.actuators)
+            wanted, targets = course.split(course.at(share[own]))
+            wanted[:, course.free] = p[own][:, course.free]
+            right = correct_onto_targets(
+                structure, z[own], wanted, course.free, course.descriptors, targets
+            )
+            z[own], p[own] = right.z, right.p
+            found[own] = right.found & (right.first <= SURE * ways[own] + EXACT)
+        middle = States(structure, z, p)
+        return middle, found & (middle.index == 0) & are_feasible(self.within, z, p)
+
+    def _with_rows(self, rows: Some, middle: States) -> "BetweenRows":
+        path, behind = self.path, rows + 1
+        at = np.insert(path.at, behind, 0.5 * (path.at[rows] + path.at[behind]))
+        z, p = (
+            np.insert(old, behind, new, axis=0)
+            for old, new in ((path.states.z, middle.z), (path.states.p, middle.p))
+        )
+        states = States(middle.structure, z, p)
+        index = np.insert(path.index, behind, 0)
+        finer = replace(path, states=states, at=at, length=path_lengths(states), index=index)
+        return replace(self, path=finer)
 
 
 def _targets(

@@ -14,7 +14,7 @@ from equimorph.equilibria.trace_options import VIOLATIONS
 from equimorph.errors import InputError
 from equimorph.model import Constraint, Descriptor, Schedule, position
 from equimorph.structures import State, States
-from equimorph.tasks.motion.between_rows import misses_between
+from equimorph.tasks.motion.between_rows import BetweenRows
 from equimorph.tasks.motion.blocks import DENSE, path_by_blocks, same_descriptors, stable_path
 from equimorph.tasks.motion.course import Course, actuator_bounds
 from equimorph.tasks.motion.redundant import follow_redundant
@@ -24,7 +24,9 @@ from equimorph.tasks.optimising.programme import Objective, stability
 from equimorph.tasks.route import FINE, describe_place, schedule_of
 from equimorph.tasks.start import Start, check_stable, start_state
 
-Failure = Literal["", "snap-through", "singular Jacobian", "actuator limit", "constraint", "lost"]
+Failure = Literal[
+    "", "snap-through", "singular Jacobian", "actuator limit", "constraint", "accuracy", "lost"
+]
 REPEATED = 1e-8
 """Relative distance of targets that are the same."""
 CRITICAL = ("critical", "branch point", "index")
@@ -41,8 +43,9 @@ class Tracking:
         "arrived", or "refused" with the reason in `why` and its class in `failure`.
     failure
         "snap-through": stability is lost. "singular Jacobian": the actuators cannot move the
-        descriptors on (det S_a = 0). "actuator limit", "constraint": a bound is met. "lost": a
-        numerical failure.
+        descriptors on (det S_a = 0). "actuator limit", "constraint": a bound is met. "accuracy":
+        the rows meet the targets, but between them these are missed by more than was allowed,
+        however many rows are inserted. "lost": a numerical failure.
     path
         Exact states up to the end of the motion; `path.at` counts legs, so that 1.5 is half-way
         through the second one.
@@ -133,6 +136,7 @@ def track(  # the knobs of the public face, all by keyword
     within: Sequence[Constraint] = (),
     monitor: Sequence[Descriptor] = (),
     beyond: bool = False,
+    accuracy: float | None = None,
 ) -> Tracking:
     """Follow targets S*(t) of descriptors with at least as many actuators, while loads may move.
 
@@ -159,6 +163,9 @@ def track(  # the knobs of the public face, all by keyword
     beyond
         Whether to follow the least-squares compromise from where the targets cannot be met; all
         legs must prescribe the same descriptors.
+    accuracy
+        Largest miss of each target, in its unit, half-way between the rows of the schedule: rows
+        are inserted until it holds.
 
     Returns
     -------
@@ -195,8 +202,13 @@ def track(  # the knobs of the public face, all by keyword
         rest = motion.compromise(path) if beyond else None
         return Tracking("refused", failure, why, path, asked, names, None, rest)
     monitored = tuple(dict.fromkeys((*asked, *(c.descriptor for c in within), *monitor)))
+    rows, why = BetweenRows(path, legs, asked, names, (*within, *bounds)), ""
+    if accuracy is not None:
+        rows, why = rows.refined(accuracy)
+    path, between = rows.path, rows.largest
+    if why:
+        return Tracking("refused", "accuracy", why, path, asked, names, between=between)
     schedule = schedule_of(path, path.states.margin, monitored)
-    between = misses_between(path, legs, asked)
     return Tracking("arrived", "", "", path, asked, names, schedule, None, between)
 
 
