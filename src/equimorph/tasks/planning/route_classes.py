@@ -17,7 +17,7 @@ from equimorph.arrays import Bool, Edges, Float, Int
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.complex.kept_tables import from_cache
 from equimorph.model import Constraint, Descriptor
-from equimorph.structures import State, States
+from equimorph.structures import State, States, join_states
 from equimorph.tasks.planning.kernels import search_classes
 from equimorph.tasks.planning.network import (
     Demands,
@@ -43,6 +43,10 @@ MOST_TURNS = 2
 """How often a path may pass around one hole."""
 LABELS = 8
 """Classes that are kept at a vertex, for each requested route."""
+
+SHORTER = 1e-2
+"""Gain of the straight way from start to goal over all routes, relative to these, from which on it
+is of a class of its own: else one of them would have become as short."""
 
 
 @check_arguments
@@ -99,19 +103,24 @@ def alternatives(
         return (refusal(why),)
     best, failed = list[Route](), list[Route]()
     for tightened in demands.with_reserves(min(end.margin for end in ends)):
-        paths = _Classes(eset, order_ends(ends), tightened).paths(count)
+        classes = _Classes(eset, order_ends(ends), tightened)
+        paths = classes.paths(count)
         corners = straight_corners(eset, paths, tightened, same_class=True)
         routes = [
             route_over_corners(eset, follow_direction(each, ends), demands, monitor)
             for each in corners
         ]
+        least = min((route.cost for route in routes if route.arrived), default=np.inf)
+        if classes.direct < (1.0 - SHORTER) * least:
+            chord = join_states(eset.structure, ends)
+            routes.append(route_over_corners(eset, chord, demands, monitor))
         best = max(best, [route for route in routes if route.arrived], key=len)
         failed += routes
         if routes and len(best) == len(routes):
             break
     if not failed:
         return (refusal(explain_no_route(eset, ends, demands)),)
-    return tuple(sorted(best, key=lambda route: route.cost)) or (failed[0],)
+    return tuple(sorted(best, key=lambda route: route.cost)[:count]) or (failed[0],)
 
 
 @dataclass(frozen=True)
@@ -124,7 +133,11 @@ class _Graph:
 
 
 class _Classes:
-    """Search for the best path of each class."""
+    """Search for the best path of each class.
+
+    `direct` is the cost of the straight way from start to goal where it is no link of the search:
+    its class is not known unless both have a common neighbour.
+    """
 
     def __init__(self, eset: EquilibriumSet, ends: Ends, demands: Demands) -> None:
         self.eset, self.ends, self.demands = eset, ends, demands
@@ -142,7 +155,9 @@ class _Classes:
         key = "cocycles", demands.constraints, demands.margin
         values = from_cache(eset, key, values_of)
         own, own_costs = end_links(eset, ends, demands)
-        own_values = _own_values(own, pairs, values, len(eset.points))
+        own_values, known = _own_values(own, pairs, values, len(eset.points))
+        self.direct = float(own_costs[~known].min(initial=np.inf))
+        own, own_costs, own_values = own[known], own_costs[known], own_values[known]
         self.graph = _Graph(
             np.concatenate([pairs, own]),
             np.concatenate([network.costs(eset, demands.objective)[self.inner], own_costs]),
@@ -191,8 +206,11 @@ def _own_values(
     pairs: Edges,
     values: Int[np.ndarray, "edges holes"],
     count: int,
-) -> Int[np.ndarray, "own holes"]:
-    """Cocycles on the links of start and goal: zero to one neighbour, elsewhere along the mesh."""
+) -> tuple[Int[np.ndarray, "own holes"], Bool[np.ndarray, " own"]]:
+    """Cocycles on the links of start and goal: zero to one neighbour, elsewhere along the mesh.
+
+    That of the link from start to goal is known by way of a common neighbour.
+    """
     out = np.zeros((len(own), values.shape[1]), dtype=int)
     for end in (count, count + 1):
         mine = np.flatnonzero((own[:, 0] == end) & (own[:, 1] < count))
@@ -210,7 +228,15 @@ def _own_values(
                     out[near[other]] = out[near[here]] + sign * values[k]
                     known.add(other)
                     queue.append(other)
-    return out
+    fixed = np.ones(len(own), bool)
+    direct = own[:, 1] == count + 1
+    first, second = (np.flatnonzero((own[:, 0] == count + end) & ~direct) for end in (0, 1))
+    _, a, b = np.intersect1d(own[first, 1], own[second, 1], return_indices=True)
+    if len(a):
+        out[direct] = out[first[a[0]]] - out[second[b[0]]]
+    elif out.shape[1]:
+        fixed[direct] = False
+    return out, fixed
 
 
 Triangles = Int[np.ndarray, "triangles 3"]
