@@ -6,7 +6,9 @@ from hypothesis import given, settings, strategies as st
 
 import equimorph as em
 from equimorph.equilibria.gradient_flow import gradient_flow, implicit_step
+from equimorph.equilibria.snap import snap_landings
 from equimorph.errors import InputError
+from equimorph.structures import join_states
 from oracles.polynomial import Polynomial, bead_on_a_circle, fold_form, pitchfork_form, slaved
 from oracles.shots import UNIFORM, from_states
 
@@ -196,6 +198,17 @@ def test_the_same_snap_lands_bit_for_bit_at_the_same_place(fold):
     for one, other in zip(first, again, strict=True):
         assert np.array_equal(one.way.z, other.way.z)
         assert np.array_equal(one.state.z, other.state.z)
+
+
+def test_snaps_that_are_followed_together_are_the_same_bits(fold, branch_point):
+    """Also at other parameters, which decide how far random guesses, the scale of lengths, lie."""
+    states = join_states(fold.structure, [fold.batch, branch_point.batch])
+    for state, landings in zip((fold, branch_point), snap_landings(states), strict=True):
+        for one, other in zip(em.snap_landing(state), landings, strict=True):
+            assert one.status == other.status
+            np.testing.assert_array_equal(one.state.z, other.state.z)
+            np.testing.assert_array_equal(one.way.z, other.way.z)
+            np.testing.assert_array_equal(one.time, other.time)
 
 
 def test_a_sudden_load_is_followed_to_its_landing(fold):

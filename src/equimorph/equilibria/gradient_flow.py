@@ -8,7 +8,7 @@ import numpy as np
 from equimorph.arrays import Bool, Flags, Float, Int, Lanes, Numbers, Parameters, Some, Values
 from equimorph.columns import Columns
 from equimorph.equilibria.settle import Guards, settle
-from equimorph.equilibria.soft_modes import extent_of_guesses, metric_length
+from equimorph.equilibria.soft_modes import extents_of_guesses, metric_length
 from equimorph.structures import Structure
 from equimorph.tolerances import CONVERGED, SAME_STATE
 
@@ -207,7 +207,7 @@ def gradient_flow(
     """
     front = _Front.of(z.copy(), FIRST_STEP / rate, length, structure.unknowns)
     code, last = np.full(len(z), Ending.SLOW.value), z.copy()
-    far = max(FARTHEST, EXTENTS * extent_of_guesses(structure, p)) if len(z) else 0.0
+    far = np.maximum(FARTHEST, EXTENTS * extents_of_guesses(structure, p))
     way = [front]
     for _ in range(pace.steps):
         if len(front.lanes) == 0:
@@ -215,7 +215,7 @@ def gradient_flow(
         front = _advance(structure, front, p[front.lanes], pace)
         way.append(front.take(front.moved))
         end, last[front.lanes] = _ends(structure, front, p[front.lanes], pace)
-        end[(end < 0) & (front.travelled > far)] = Ending.ESCAPED
+        end[(end < 0) & (front.travelled > far[front.lanes])] = Ending.ESCAPED
         end[(end < 0) & (front.failed > FAILURES)] = Ending.STUCK
         ended = end >= 0
         code[front.lanes[ended]] = end[ended]

@@ -10,7 +10,7 @@ import numpy as np
 
 from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Float
-from equimorph.equilibria.descents import descend
+from equimorph.equilibria.descents import Descents, descend
 from equimorph.equilibria.gradient_flow import FAITHFUL, Ending, Flow, gradient_flow, implicit_step
 from equimorph.equilibria.lift import check_start
 from equimorph.equilibria.soft_modes import soft_modes
@@ -113,13 +113,23 @@ def snap_landing(state: State, *, at: Mapping[str, float] | None = None) -> tupl
             f"`state` must be unstable or critical; got index 0 with a margin of "
             f"{state.margin:.3g}. Change parameters by `at` to leave a stable state."
         )
-    led = descend(structure, state.z[None], state.p[None], FAITHFUL)
-    ways = zip((1, -1), led.code[:, 0].tolist(), led.lane[:, 0].tolist(), strict=True)
+    return _both_ways(descend(structure, state.z[None], state.p[None], FAITHFUL), 0, state)
+
+
+def snap_landings(states: States) -> list[tuple[Landing, ...]]:
+    """Both landings of each of some unstable or critical states, followed at once as one batch."""
+    led = descend(states.structure, states.z, states.p, FAITHFUL)
+    return [_both_ways(led, lane, states[lane]) for lane in range(len(states))]
+
+
+def _both_ways(led: Descents, lane: int, state: State) -> tuple[Landing, ...]:
+    """Landings of one of the states that were left."""
+    ways = zip((1, -1), led.code[:, lane].tolist(), led.lane[:, lane].tolist(), strict=True)
     return tuple(
         _still(state, direction, code)
-        if lane < 0
-        else _landing(led.flow.lane(lane), state, direction)
-        for direction, code, lane in ways
+        if flow < 0
+        else _landing(led.flow.lane(flow), state, direction)
+        for direction, code, flow in ways
     )
 
 

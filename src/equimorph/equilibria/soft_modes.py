@@ -109,6 +109,12 @@ def extent_of_guesses(structure: Structure, p: Parameters) -> float:
     return 2.0 * float(metric_length(structure, u - u.mean(axis=0)).max())
 
 
+def extents_of_guesses(structure: Structure, p: Parameters) -> Values:
+    """The same for each lane at its own parameters."""
+    own, back = np.unique(p, axis=0, return_inverse=True)
+    return np.array([extent_of_guesses(structure, each[None]) for each in own])[back.ravel()]
+
+
 def _response(structure: Structure, z: Lanes, p: Parameters, vector: Modes, shift: Values) -> Modes:
     """Solve (F_z − shift·M) x = M·vector for the unknowns."""
     n = structure.unknowns
@@ -121,7 +127,7 @@ def _lengths(
     structure: Structure, z: Lanes, p: Parameters, mode: Modes, eigenvalue: Values
 ) -> tuple[tuple[Values, Values], Values, Flags]:
     """Both lengths of modes, the size of eigenvalues there, and where the state is critical."""
-    widest = WIDEST * extent_of_guesses(structure, p)
+    widest = WIDEST * extents_of_guesses(structure, p)
     size = np.abs(eigenvalue)
     third = np.abs(_third(structure, z, p, mode))
     by_third = size / np.maximum(third, 1e-300)

@@ -10,13 +10,15 @@ from itertools import pairwise
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
-from equimorph.arrays import Facets, Int, ItemFlags, Items
-from equimorph.equilibria import Landing, snap_landing
+from equimorph.arrays import Facets, Int, Items
+from equimorph.equilibria import Landing
+from equimorph.equilibria.snap import snap_landings
 from equimorph.errors import InputError
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.manifold.complex.kept_tables import from_cache
 from equimorph.manifold.geometry.topology import facets_of, flags_of, pieces
 from equimorph.model import Progress, Silent
+from equimorph.structures import join_states
 from equimorph.tolerances import SAME_SOLUTION
 
 NOWHERE = -1
@@ -160,11 +162,13 @@ class _Edge:
         """Runs of vertices with the same landing."""
         count = len(self.vertices)
         tried = sorted({round(k) for k in np.linspace(0, count - 1, min(samples, count))})
-        if len(self.eset.names) == 2:
-            for low, high in pairwise(tried):
-                self._bisect(low, high)
-        for place in tried:
-            self._outcome(place)
+        self._try(tried)
+        pairs = list(pairwise(tried)) if len(self.eset.names) == 2 else []
+        while pairs := [each for each in pairs if self._changes(*each)]:
+            middles = [(low + high) // 2 for low, high in pairs]
+            self._try(middles)
+            halves = zip(pairs, middles, strict=True)
+            pairs = [each for (low, high), mid in halves for each in ((low, mid), (mid, high))]
         out: list[Snap] = []
         run: list[int] = []
         order = sorted(self.known)
@@ -184,39 +188,38 @@ class _Edge:
         along = self.vertices[run[0] : run[-1] + 1] if ordered else self.vertices[run]
         return Snap(self.source, target, status, self.vertices[run], landings, along)
 
-    def _bisect(self, low: int, high: int) -> None:
-        """Try places between two, as long as their outcomes differ."""
-        while high - low > 1 and self._outcome(low) != self._outcome(high):
-            middle = (low + high) // 2
-            if self._outcome(middle) == self._outcome(low):
-                low = middle
-            else:
-                self._bisect(middle, high)
-                high = middle
+    def _changes(self, low: int, high: int) -> bool:
+        """Whether the outcome changes between two places that are no neighbours."""
+        return high - low > 1 and self._outcome(low) != self._outcome(high)
 
     def _outcome(self, place: int) -> tuple[str, int]:
-        if place not in self.known:
-            landing = self._landing(int(self.vertices[place]))
-            self.known[place] = landing, self._stratum(landing)
         landing, stratum = self.known[place]
         return landing.status, stratum
 
-    def _landing(self, vertex: int) -> Landing:
-        """Landing of the snap from a vertex; at most one of the two directions leads away."""
-        landings = snap_landing(self.eset.points[vertex])
-        return next((each for each in landings if each.status != "held"), landings[0])
+    def _try(self, places: list[int]) -> None:
+        """Follow the snaps from vertices; at most one of the two directions leads away."""
+        states = self.eset.points[self.vertices[places]]
+        landings = [
+            next((each for each in ways if each.status != "held"), ways[0])
+            for ways in snap_landings(states)
+        ]
+        found = zip(landings, self._strata(landings), strict=True)
+        self.known.update(zip(places, found, strict=True))
 
-    def _stratum(self, landing: Landing) -> int:
-        """Stratum on which a landing lies."""
+    def _strata(self, landings: list[Landing]) -> list[int]:
+        """Strata on which landings lie."""
         eset, structure = self.eset, self.eset.structure
-        if not landing.landed:
-            return NOWHERE
-        at = {name: np.array([landing.state[name]]) for name in eset.names}
-        here = eset.over(**at)
-        gap = (here.states.z - landing.state.z)[:, : structure.unknowns] ** 2 @ structure.mass
-        near: ItemFlags = np.sqrt(gap) < SAME_SOLUTION
-        found = here.stratum[near]
-        return int(found[0]) if len(found) else NOWHERE
+        out = [NOWHERE] * len(landings)
+        landed = [k for k, each in enumerate(landings) if each.landed]
+        if not landed:
+            return out
+        ends = join_states(structure, [landings[k].state.batch for k in landed])
+        over = eset.over(**{name: ends[name] for name in eset.names})
+        gap = (over.states.z - ends.z[over.point])[:, : structure.unknowns] ** 2 @ structure.mass
+        near = np.flatnonzero(np.sqrt(gap) < SAME_SOLUTION)
+        for row in near[::-1].tolist():  # the first one counts
+            out[landed[over.point[row]]] = int(over.stratum[row])
+        return out
 
 
 def _in_words(eset: EquilibriumSet, snap: Snap) -> str:
