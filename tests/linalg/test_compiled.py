@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numba import float64
+from numba import float64, int64
 
 import equimorph
 from equimorph.linalg import compiled
@@ -60,10 +60,22 @@ def test_a_change_of_sources_makes_kernels_new(fresh, monkeypatch: pytest.Monkey
     assert _hits(changed) == 0
 
 
+def test_what_kernels_call_has_no_machine_code(fresh):
+    """It is kept for callers, and becomes code when Python calls it, too."""
+    module = fresh()
+    assert module.triple_of_literal() == 6
+    assert not module.double.signatures
+    assert not compiled.kept_signatures(module.double)
+    again = fresh()
+    assert again.double.part().compile((int64,))
+    assert _hits(again.double.part()) == 1
+    assert again.double(2) == 4
+
+
 def test_literal_numbers_make_no_copies(fresh):
     module = fresh()
     assert module.triple_of_literal() == 6
-    assert len(module.double.signatures) == 1
+    assert len(module.double.part().signatures) == 1
 
 
 def test_code_for_several_types_is_kept_side_by_side(fresh):

@@ -135,11 +135,15 @@ def compile_ahead(calls: Iterable[KernelCall]) -> None:
         Popen(command, stdout=DEVNULL, stderr=DEVNULL)
         for _ in range(min(cores(), len(missing)) - 1)
     ]
+    collects = gc.isenabled()
+    gc.disable()  # compiling makes many objects that live on
     try:
         _share(missing)
         for each in missing:  # what a helper has not finished, or failed to do
             each.kernel.compile(each.types)
     finally:
+        if collects:
+            gc.enable()
         for helper in helpers:
             helper.terminate()
             helper.wait()
@@ -175,7 +179,7 @@ def _share(calls: Iterable[KernelCall]) -> None:
 def main() -> None:
     """Compile all calls, or, as a helper, a share of those whose numbers are given."""
     known = known_calls()
-    gc.disable()  # compiling makes many objects that live on; this process ends soon
+    gc.disable()  # as in `compile_ahead`
     numbers = [each for each in sys.argv[1:] if each != BEHIND]
     if len(numbers) < len(sys.argv) - 1:
         os.nice(19)

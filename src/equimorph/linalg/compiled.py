@@ -23,31 +23,40 @@ from numba import types
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 from numba.core.compiler_lock import global_compiler_lock
 
+from equimorph.linalg.part_libraries import PartCacheImpl, PartCompiler
+
 _HERE = Path(__file__).resolve()
 _ROOT = _HERE.parents[2]
-SHARED = (_HERE, _HERE.with_name("simd.py"))
+SHARED = (_HERE, _HERE.with_name("part_libraries.py"), _HERE.with_name("simd.py"))
 """Files with code that goes into every kernel."""
 IMPORTED = re.compile(r"^from (equimorph(?:\.\w+)+) import", re.MULTILINE)
 """How a file of kernels names one whose kernels it calls."""
 CHECK = 32
 """Bytes of the checksum before compiled code: damaged code would crash the process."""
 
+LEAN: dict[str, Any] = {"no_cfunc_wrapper": True}
+PART: dict[str, Any] = {**LEAN, "no_cpython_wrapper": True, "pipeline_class": PartCompiler}
+"""Options of kernels that are called from Python or by kernels, not from C; of their parts."""
+
 AWAITED: set[str] = set()
 """Names of kernels that another process compiles while this one does without them."""
 
 
 def njit(**options: Any) -> Callable[[Any], Any]:
-    """Compile a function when it is first called with arguments of new types, and keep the code."""
+    """Compile a function when it is first called with arguments of new types, and keep the code.
+
+    What other kernels call is its `part`, which is kept for itself.
+    """
 
     def compiled(function: Any) -> Any:
-        dispatcher = numba.njit(**options)(function)
-        dispatcher._cache = _KernelCache(function)
-        dispatcher.compile = _alone(dispatcher)
+        dispatcher = _keep(numba.njit(**options, **LEAN)(function), _KernelCache)
+        part = cache(lambda: _keep(template(**options)(function), _PartCache))
         # of a literal number the compiler would make another copy of the kernel
-        resolve = dispatcher.get_call_template
-        dispatcher.get_call_template = lambda args, names: resolve(
+        dispatcher.get_call_template = lambda args, names: part().get_call_template(
             [types.unliteral(each) for each in args], names
         )
+        dispatcher.get_overload = lambda signature: part().get_overload(signature)
+        dispatcher.part = part
         return dispatcher
 
     return compiled
@@ -58,7 +67,14 @@ def template(**options: Any) -> Callable[[Any], Any]:
 
     Only the code of those kernels is kept.
     """
-    return numba.njit(**options)  # type: ignore[no-any-return]
+    return numba.njit(**options, **PART)  # type: ignore[no-any-return]
+
+
+def _keep(dispatcher: Any, kind: Any) -> Any:
+    """Let a kernel keep its code on disk."""
+    dispatcher._cache = kind(dispatcher.py_func)
+    dispatcher.compile = _alone(dispatcher)
+    return dispatcher
 
 
 def _alone(dispatcher: Any) -> Callable[[Any], Any]:
@@ -129,17 +145,28 @@ def digest(path: Path) -> str:
 class _KernelCache(FunctionCache):
     """Compiled code of one kernel, valid while the sources that go into it stay as they are."""
 
+    ending = ""
+    """Of the names of its files."""
+
     def __init__(self, function: Any) -> None:
         super().__init__(function)
         stamp = digest(Path(function.__code__.co_filename))
-        self._cache_file = _KernelFiles(self.cache_path, self._impl.filename_base, stamp)
+        self._base = self._impl.filename_base + self.ending
+        self._cache_file = _KernelFiles(self.cache_path, self._base, stamp)
 
     @contextmanager
     def lock(self, *, wait: bool) -> Iterator[None]:
         """Keep other processes from this kernel; a BlockingIOError if one has it and none waits."""
-        with Path(self.cache_path, f"{self._impl.filename_base}.lock").open("w") as handle:
+        with Path(self.cache_path, f"{self._base}.lock").open("w") as handle:
             fcntl.flock(handle, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
             yield
+
+
+class _PartCache(_KernelCache):
+    """Code of a kernel for those that call it."""
+
+    _impl_class = PartCacheImpl  # type: ignore[assignment]
+    ending = ".part"
 
 
 class _KernelFiles(IndexDataCacheFile):
