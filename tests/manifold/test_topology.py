@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from equimorph.manifold.complex.pinches import pinched_vertices
 from equimorph.manifold.geometry.kernels import cut_rows
 from equimorph.manifold.geometry.topology import (
     adjacency,
@@ -176,3 +177,24 @@ def test_many_cells_around_one_edge_are_cut_in_two_each():
     assert {frozenset(row) for row in cut.tolist()} == {
         frozenset((base, end, k)) for end in (0, 1) for k in range(2, base)
     }
+
+
+def test_vertices_are_pinched_where_cells_around_them_are_no_ball():
+    """Two triangles or tetrahedra that share one corner; a void in a ball that touches its hull."""
+    lone = np.array([[0, 1, 2], [0, 3, 4]])
+    np.testing.assert_array_equal(pinched_vertices(lone, adjacency(lone), 5), [0])
+    pair = np.array([[0, 1, 2, 3], [0, 4, 5, 6]])
+    np.testing.assert_array_equal(pinched_vertices(pair, adjacency(pair), 7), [0])
+    cone = np.concatenate([OCTAHEDRON, np.full((8, 1), 6)], axis=1)
+    for whole in (OCTAHEDRON, torus(), moebius(), STRIP, cone, cone[1:]):
+        assert len(pinched_vertices(whole, adjacency(whole), 42)) == 0
+    # the middle of a ball without two opposite cells is on its hull twice
+    np.testing.assert_array_equal(np.intersect1d(cone[0], cone[6]), [6])
+    twice = np.delete(cone, [0, 6], axis=0)
+    np.testing.assert_array_equal(pinched_vertices(twice, adjacency(twice), 7), [6])
+    # one of the cells around a vertex inside another is left out, with an edge on the hull
+    around = [[*np.delete(cone[0], k), 7] for k in range(1, 4)]
+    void = np.concatenate([cone[1:], around])
+    assert euler_characteristic(void) == 2
+    on_hull = np.delete(cone[0], [0, 3])
+    np.testing.assert_array_equal(pinched_vertices(void, adjacency(void), 8), np.sort(on_hull))

@@ -13,26 +13,26 @@ from scipy.spatial import cKDTree
 
 from equimorph.arrays import (
     CellFlags,
-    Facets,
     Float,
     Int,
-    ItemFlags,
     Items,
     Pairs,
+    Place,
     VertexFlags,
     VertexNumbers,
 )
 from equimorph.equilibria.locus import Locus, nearest
-from equimorph.linalg.graphs import components
 from equimorph.manifold.complex.description import Complex, describe_again
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.manifold.complex.excerpts import excerpt_of, sheets_of
+from equimorph.manifold.complex.joins import groups_of, joined
 from equimorph.manifold.complex.kept_tables import places_of
+from equimorph.manifold.complex.pinches import ON_SIDE, pinched_vertices
 from equimorph.manifold.complex.vertices import Vertices
 from equimorph.manifold.geometry.exact_points import Aim, Pinned, correct_points
 from equimorph.manifold.geometry.points import VertexKind, are_singular
 from equimorph.manifold.geometry.setting import embed
-from equimorph.manifold.geometry.topology import adjacency, flags_of
+from equimorph.manifold.geometry.topology import adjacency
 from equimorph.manifold.lifting.cells import Cells
 from equimorph.manifold.lifting.grid import Lines
 from equimorph.manifold.lifting.pairing import Pairing, abandoned_rays
@@ -46,8 +46,6 @@ OUTWARDS = 1e-4
 """Part of an interval by which sides are moved: sheets that cross in a side are as far apart."""
 SHARES = np.array([1.0, 0.6180, 0.7549])
 """Of the free parameters: diagonals through corners must not pass through the moved ones."""
-ON_SIDE = 1e-9
-"""Distance from a side, in widths of the box, of vertices that lie on it."""
 NEARER = 0.5
 """How far vertices may go to cusps, over the distance of the nearest one in the box."""
 
@@ -94,6 +92,7 @@ def box_of(names: tuple[str, ...], lines: Lines) -> Box:
 
 def trimmed(eset: EquilibriumSet, box: Box) -> EquilibriumSet:
     """The part of a set over a box whose sides are a little inside those of its own."""
+    eset = _Trim(eset, box).with_joined_neighbours()
     trim = _Trim(_without_beyond(eset, box), box)
     eset = trim.on_sides()
     for axis in range(len(box.names)):
@@ -104,7 +103,9 @@ def trimmed(eset: EquilibriumSet, box: Box) -> EquilibriumSet:
     audit = replace(audit, undecided=audit.undecided + audit.unrefined, unrefined=0)
     mesh = replace(eset.mesh, vertices=np.clip(eset.mesh.vertices, box.lower, box.upper))
     points = States(eset.structure, eset.points.z, _without_round_off(eset, box))
-    return replace(eset, box=box, mesh=mesh, points=points, audit=audit)
+    eset = replace(eset, box=box, mesh=mesh, points=points, audit=audit)
+    # vertices may be singular in sides of the box alone
+    return describe_again(eset, _whole(eset), eset.setting)
 
 
 def _without_round_off(eset: EquilibriumSet, box: Box) -> Float[np.ndarray, "V P"]:
@@ -127,6 +128,11 @@ def _only(eset: EquilibriumSet, cells: CellFlags) -> Complex:
     """Some cells of a set."""
     recut = excerpt_of(eset, np.zeros(len(eset.cells), bool)).put_back()
     return recut.complex(cells, np.zeros(len(recut.points), bool))
+
+
+def _whole(eset: EquilibriumSet) -> Complex:
+    """All cells of a set."""
+    return _only(eset, np.ones(len(eset.cells), bool))
 
 
 def _without_beyond(eset: EquilibriumSet, box: Box) -> EquilibriumSet:
@@ -154,27 +160,69 @@ class _Trim:
             own = rows[at.found]
             z[own], p[own], found[own] = at.z[at.found], at.p[at.found], True
         points = States(eset.structure, z, p)
-        whole = replace(_only(eset, np.ones(len(eset.cells), bool)), points=points, fresh=None)
+        whole = replace(_whole(eset), points=points, fresh=None)
         pairs = np.concatenate([self._coinciding(points), self._swallowed(points, found)])
-        same, flaws = pairs[:0], self._flaws(whole)
-        for own in _groups(pairs, len(points)):
-            more = np.concatenate([same, own])
-            same = more if (self._flaws(_welded(whole, more)) <= flaws).all() else same
-        return describe_again(eset, _welded(whole, same), eset.setting)
+        return describe_again(eset, self._joined(whole, pairs), eset.setting)
 
-    def _flaws(self, whole: Complex) -> Int[np.ndarray, " 2"]:
-        """Facets with more than two cells, and those with one that do not lie on a side."""
+    def with_joined_neighbours(self) -> EquilibriumSet:
+        """The set with singular vertices beyond sides as one with those of their fold nearby.
+
+        Where a fold leads through a corner of the box, it has several at the corner, closer to each
+        other than sides were moved. What lies beyond sides would leave a void between these.
+        """
+        eset = self.eset
+        whole, place = replace(_whole(eset), fresh=None), eset.coordinates
+        ends = [
+            facets[:, list(two)]
+            for facets in (whole.folds, whole.caps, whole.crossings)
+            for two in combinations(range(facets.shape[1]), 2)
+        ]
+        pairs = np.unique(np.concatenate([np.zeros((0, 2), int), *ends]), axis=0)
+        apart = np.abs(place[pairs[:, 0]] - place[pairs[:, 1]])
+        pairs = pairs[(apart <= self._near).all(axis=1)]
+        pairs = pairs[self._beyond[pairs].any(axis=1)]
+        if len(pairs):
+            eset = describe_again(eset, self._joined(whole, pairs), eset.setting)
+        return eset
+
+    def _joined(self, whole: Complex, pairs: Pairs) -> Complex:
+        """Cells with pairs of vertices joined, where that leaves no more flaws than there were."""
+        flaws = self._flaws(whole)
+        every = joined(whole, pairs, self._rank)
+        if (self._flaws(every) <= flaws).all():
+            return every
+        same = pairs[:0]
+        for own in groups_of(pairs, len(whole.points)):
+            more = np.concatenate([same, own])
+            same = more if (self._flaws(joined(whole, more, self._rank)) <= flaws).all() else same
+        return joined(whole, same, self._rank)
+
+    def _flaws(self, whole: Complex) -> Int[np.ndarray, " 3"]:
+        """Facets with more than two cells, those with one off the sides, pinched vertices."""
         known, box = adjacency(whole.cells), self.box
         place, slack = whole.points.p[:, self.eset.setting.free], ON_SIDE * (box.upper - box.lower)
         on = [np.abs(place - bound) <= slack for bound in (box.lower, box.upper)]
         inside = ~np.concatenate(on, axis=1)[known.facets].all(axis=1).any(axis=1)
-        return np.array([(known.counts > 2).sum(), (inside & (known.counts == 1)).sum()])
+        pinched = len(pinched_vertices(whole.cells, known, len(place)))
+        return np.array([(known.counts > 2).sum(), (inside & (known.counts == 1)).sum(), pinched])
 
     @cached_property
     def _beyond(self) -> VertexFlags:
         """Vertices that lie beyond sides."""
         place = self.eset.coordinates
         return np.asarray(((place < self.box.lower) | (place > self.box.upper)).any(axis=1))
+
+    @property
+    def _near(self) -> Place:
+        """Twice the distance by which sides were moved."""
+        box, wide = self.box, self.eset.box
+        return np.asarray(2.0 * np.maximum(box.lower - wide.lower, wide.upper - box.upper))
+
+    @cached_property
+    def _rank(self) -> VertexNumbers:
+        """Which vertices stand for others: singular ones, beyond as many sides as possible."""
+        sides = [beyond >= 0.0 for *_, beyond in _sides(self.eset, self.box)]
+        return np.sum([*sides, (len(sides) + 1) * are_singular(self.eset.kinds)], axis=0)
 
     @cached_property
     def _clipped(self) -> Float[np.ndarray, "V P"]:
@@ -262,8 +310,7 @@ class _Trim:
         lost = np.flatnonzero(~found)
         met = np.flatnonzero(found & are_singular(eset.kinds) & self._beyond)
         there = self._clipped[lost][:, None] - points.p[met][None]
-        moved = np.maximum(self.box.lower - eset.box.lower, eset.box.upper - self.box.upper)
-        near = (np.abs(there[:, :, eset.setting.free]) <= 2.0 * moved).all(axis=2)
+        near = (np.abs(there[:, :, eset.setting.free]) <= self._near).all(axis=2)
         place = embed(eset.setting, points.z, points.p)
         pairs = [
             (row, other)
@@ -280,66 +327,6 @@ class _Trim:
         places = places_of(self.eset)
         gaps = np.linalg.norm(places[around] - places[row], axis=1)
         return NEARER * float(gaps.min(initial=np.inf))
-
-
-def _groups(pairs: Pairs, count: int) -> list[Int[np.ndarray, "_ 2"]]:
-    """Pairs of vertices that hang together."""
-    label = components(count, pairs)
-    own = label[pairs[:, 0]]
-    return [pairs[own == each] for each in np.unique(own)]
-
-
-def _one_of_same(whole: Complex, same: Pairs) -> VertexNumbers:
-    """For each vertex the one that stands for it, a singular one if there is any."""
-    label = components(len(whole.points), same)
-    order = np.argsort(~are_singular(whole.kinds), kind="stable")
-    _, first = np.unique(label[order], return_index=True)
-    return np.asarray(order[first][label])
-
-
-def _welded(whole: Complex, same: Pairs) -> Complex:
-    """Cells in which vertices that are the same point are one.
-
-    Two cells with the same vertices then lie on one another and vanish; what they leave between
-    cells of different index is a fold.
-    """
-    if len(same) == 0:
-        return whole
-    one = _one_of_same(whole, same)
-    cells, index = one[whole.cells], whole.cell_index
-    kept = _distinct(cells)
-    _, label, counts = np.unique(
-        np.sort(cells, axis=1), axis=0, return_inverse=True, return_counts=True
-    )
-    double = kept & (counts == 2)[label]
-    gone, cells, index = cells[double], cells[kept & ~double], index[kept & ~double]
-    known = adjacency(cells)
-    between = known.across[index[known.links[:, 0]] != index[known.links[:, 1]]]
-    left = known.facets[between]
-    left = left[flags_of(left, _facets(gone))]
-    used, numbered = np.unique(cells, return_inverse=True)
-    number = np.full(len(one), -1)
-    number[used] = np.arange(len(used))
-    marked = {name: one[getattr(whole, name)] for name in ("folds", "caps", "crossings")}
-    marked["folds"] = np.concatenate([marked["folds"], left])
-    marked = {name: number[facets[_distinct(facets)]] for name, facets in marked.items()}
-    marked = {name: facets[(facets >= 0).all(axis=1)] for name, facets in marked.items()}
-    columns = {name: getattr(whole, name)[used] for name in ("kinds", "index", "grid_vertex")}
-    return replace(
-        whole, points=whole.points[used], **columns, cells=numbered.reshape(cells.shape),
-        cell_index=index, **marked,
-    )  # fmt: skip
-
-
-def _facets(cells: Int[np.ndarray, "cells corners"]) -> Facets:
-    """All facets of some cells."""
-    return np.concatenate([np.delete(cells, k, axis=1) for k in range(cells.shape[1])])
-
-
-def _distinct(rows: Facets) -> ItemFlags:
-    """Which rows have no vertex twice."""
-    ordered = np.sort(rows, axis=1)
-    return np.asarray((ordered[:, 1:] != ordered[:, :-1]).all(axis=1))
 
 
 def _cut_off(eset: EquilibriumSet, box: Box, axis: int, *, lower: bool) -> EquilibriumSet:

@@ -23,7 +23,8 @@ class Audit:
     """Numbers that tell whether a set can be trusted.
 
     Must be zero for a clean set: `unpaired` (curves that could not be lifted), `conflicts` left,
-    `parity_violations`, `undecided` triangles, `non_manifold` edges, orientation `contradictions`.
+    `parity_violations`, `undecided` triangles, orientation `contradictions`, `non_manifold` edges
+    and vertices (around which cells are neither a ball nor half of one).
     `retraced` conflicts were resolved by finer steps, `bisected` triangles by subdivision.
     Facets at which two sheets cross (`crossings`: four cells each, whose orientations cancel) are
     not counted among the non-manifold ones.
@@ -176,7 +177,7 @@ class Audit:
             ("conflicting pairs", f"{self.conflicts} ({self.retraced} resolved by finer steps)"),
             ("parity violations", str(self.parity_violations)),
             ("undecided triangles", f"{self.undecided} ({self.bisected} resolved by bisection)"),
-            ("non-manifold edges", str(self.non_manifold)),
+            ("non-manifold edges and vertices", str(self.non_manifold)),
             *([("edges where sheets cross", str(self.crossings))] if self.crossings else []),
             ("orientation contradictions", str(self.contradictions)),
             ("overturned cells", str(self.overturned)),

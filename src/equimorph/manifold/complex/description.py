@@ -18,6 +18,7 @@ from equimorph.manifold.complex.equilibrium_set import (
     Stratum,
     with_audit,
 )
+from equimorph.manifold.complex.pinches import count_pinched
 from equimorph.manifold.geometry.points import are_singular
 from equimorph.manifold.geometry.setting import Setting
 from equimorph.manifold.geometry.topology import (
@@ -127,7 +128,7 @@ def describe(frame: Frame, given: Complex, lifting: Lifting) -> EquilibriumSet:
         Stratum(int(given.cell_index[own[0]]), len(own), int(component[own[0]]))
         for own in (np.flatnonzero(stratum == k) for k in range(stratum.max(initial=-1) + 1))
     )
-    audit = _audit(given, lifting, crossed, whole, component, boundaries, frame.setting, checked)
+    audit = _audit(given, lifting, crossed, whole, component, boundaries, frame, checked)
     eset = EquilibriumSet(
         structure=frame.setting.structure,
         box=frame.box,
@@ -262,27 +263,26 @@ def _audit(
     whole: Adjacency,
     component: CellNumbers,
     boundaries: tuple[Boundary, ...],
-    setting: Setting,
+    frame: Frame,
     checked: Callable[[], _Checked],
 ) -> Audit:
     corners, cell_index, points = given.cells, given.cell_index, given.points
-    coordinates = points.p[:, setting.free]
+    coordinates, scales = points.p[:, frame.setting.free], frame.setting.scales
     crossings = whole.facets[crossed]
     sense = _senses(corners, cell_index, coordinates, crossings, whole, component)
     edges = len(whole.facets) if whole.facets.shape[1] == PAIR else None
-    wrong = overturned_off_folds(
-        given.kinds, corners, sense.overturned, coordinates / setting.scales
-    )
+    wrong = overturned_off_folds(given.kinds, corners, sense.overturned, coordinates / scales)
     at_points = checked()
     wrong |= at_points.wrong
     whole_crossing = whole.counts == SHEETS_AT_A_CROSSING
     most = np.where(crossed, SHEETS_AT_A_CROSSING, 2)
     kinds = [boundary.kind for boundary in boundaries]
+    pinches = count_pinched(frame.setting, frame.box, points, given.kinds, corners, whole)
     return Audit(
         vertices=len(points),
         cells=len(corners),
         **vars(lifting),
-        non_manifold=int((whole.counts > most).sum()),
+        non_manifold=int((whole.counts > most).sum()) + pinches,
         crossings=int(crossed.sum()),
         contradictions=sense.contradictions
         + count_unbalanced(corners, cell_index, whole, sense, crossed & whole_crossing),
