@@ -1,6 +1,7 @@
 """Sides of the box: sets are lifted over sides moved outwards, and end at the sides again.
 
-See docs/decisions.md, "Sides in which a set is singular are moved outwards".
+See docs/decisions.md, "Sides in which a set is singular are moved outwards" and "Points of a fold
+nearer to each other than sides were moved are one".
 """
 
 from collections.abc import Iterator
