@@ -223,7 +223,9 @@ class _Trim:
     def _rank(self) -> VertexNumbers:
         """Which vertices stand for others: singular ones, beyond as many sides as possible."""
         sides = [beyond >= 0.0 for *_, beyond in _sides(self.eset, self.box)]
-        return np.sum([*sides, (len(sides) + 1) * are_singular(self.eset.kinds)], axis=0)
+        return np.asarray(
+            np.sum([*sides, (len(sides) + 1) * are_singular(self.eset.kinds)], axis=0)
+        )
 
     @cached_property
     def _clipped(self) -> Float[np.ndarray, "V P"]:
