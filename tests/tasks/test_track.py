@@ -214,3 +214,31 @@ def test_an_unstable_start_is_refused():
     unstable = State(SPRING, np.array([0.0]), np.array([0.80, 0.0, 1.0]))
     with pytest.raises(InputError, match="must be stable; got a state of index 1"):
         em.track(unstable, {ANGLE: 0.1}, actuators=["x_l"])
+
+
+def named(name, function):
+    return em.Descriptor(name, "1", function)
+
+
+@pytest.mark.parametrize("names", [("same", "same"), (ANGLE.name,)])
+def test_descriptors_that_share_a_name_are_refused(start, names):
+    """A schedule knows values by name: one of both was left out in silence."""
+    both = [named(n, lambda z, p, k=k: (3.0 + k) * z[:, 0]) for k, n in enumerate(names)]
+    with pytest.raises(em.InputError, match="names of their own"):
+        em.track(start, {ANGLE: 0.5}, actuators=["x_l"], monitor=both)
+
+
+@pytest.mark.parametrize(
+    "name", ["progress", "stability_margin", "time", "x_l", "a,b", 'a "b"', "="]
+)
+def test_descriptors_with_names_of_columns_come_back(start, tmp_path, name):
+    own = named(name, lambda z, p: 7.0 + z[:, 0])
+    found = em.track(start, {ANGLE: 0.5}, actuators=["x_l"], monitor=[own])
+    for schedule in (found.schedule, found.schedule.in_time(duration=2.0)):
+        for ending in (".csv", ".json"):
+            em.storage.write_schedule(schedule, tmp_path / f"table{ending}")
+            back = em.storage.read_schedule(tmp_path / f"table{ending}")
+            assert np.array_equal(back.descriptors[name], 7.0 + found.values[ANGLE.name])
+            assert np.array_equal(back.progress, schedule.progress)
+            assert np.array_equal(back.margins, schedule.margins)
+            assert np.array_equal(back.values, schedule.values)

@@ -110,8 +110,9 @@ DERIVATIVES = (("velocities", "rate", ""), ("accelerations", "acceleration", "²
 
 
 def column_of(descriptor: str, parameters: Sequence[str]) -> str:
-    """Name of a descriptor's column, other than those of the parameters: ``F (descriptor)``."""
-    return f"{descriptor} (descriptor)" if descriptor in parameters else descriptor
+    """Name of a descriptor's column, other than those of all others: ``F (descriptor)``."""
+    taken = descriptor in (*parameters, PROGRESS, MARGIN, TIME)
+    return f"{descriptor} (descriptor)" if taken else descriptor
 
 
 Instants = float | Float[np.ndarray, "*instants"]

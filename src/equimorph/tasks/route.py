@@ -243,6 +243,22 @@ def _identity(structure: Structure) -> dict[str, Any] | None:
         return None
 
 
+def _values_by_name(
+    descriptors: Sequence[Descriptor], states: States
+) -> dict[str, Float[np.ndarray, " steps"]]:
+    """Values of descriptors; two that differ and have the same name are refused."""
+    found: dict[str, Float[np.ndarray, " steps"]] = {}
+    for each in descriptors:
+        values = each(states)
+        known = found.setdefault(each.name, values)
+        if not np.allclose(known, values, rtol=1e-6, atol=1e-12, equal_nan=True):
+            raise InputError(
+                f"`monitor` and all other descriptors must have names of their own; got two that "
+                f"differ, both named {each.name}."
+            )
+    return found
+
+
 def schedule_of(
     path: Path, margins: Float[np.ndarray, " steps"], descriptors: Sequence[Descriptor]
 ) -> Schedule:
@@ -257,7 +273,7 @@ def schedule_of(
         values=states.p.copy(),
         progress=path.length / path.length[-1],
         margins=margins,
-        descriptors={d.name: d(states) for d in descriptors},
+        descriptors=_values_by_name(descriptors, states),
         start={"structure": _identity(structure), "unknowns": states.z[0].tolist()},
         way_points=corners,
         time_unit=structure.time_unit,
