@@ -3,6 +3,7 @@
 Everything heavy is imported inside the command that needs it, so that ``--help`` answers at once.
 """
 
+import gc
 import json
 import logging
 import sys
@@ -10,7 +11,7 @@ import warnings
 from collections.abc import Callable, Generator, Iterable
 from contextlib import contextmanager
 from enum import StrEnum
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -266,9 +267,21 @@ def _workers_of(cluster: str) -> Generator[Any]:
         yield workers
 
 
+@cache
+def _import_uncollected() -> None:
+    """Import what runs studies; the garbage collector never looks at what these modules define."""
+    gc.disable()
+    import equimorph.cli.output
+    import equimorph.cli.run  # noqa: F401  # modules are wanted, not names
+
+    gc.freeze()
+    gc.enable()
+
+
 def _run_one(file: Path, out: Path, workers: Any, *, replace: bool, **shown: bool) -> int:
     """Run one study; return its exit code."""
     try:
+        _import_uncollected()
         from equimorph.cli.output import Output
         from equimorph.cli.run import run_and_show
 
