@@ -134,10 +134,11 @@ def _repeats(pairing: Pairing, points: Items) -> bool:
     """
     structure, constraints = pairing.setting.structure, pairing.setting.constraints
     z, p = pairing.points.z[points], pairing.points.p[points]
-    turns = np.rint((z[None] - z[:, None]) / TURN)
-    turns[:, :, structure.unknowns :] = 0.0
-    alike = np.abs(z[None] - z[:, None] - TURN * turns).max(axis=2) < SAME_STATE
-    for own, (copies, turned) in enumerate(zip(alike, turns, strict=True)):
+    for own in range(len(z)):
+        apart = z - z[own]
+        turned = np.rint(apart / TURN)
+        turned[:, structure.unknowns :] = 0.0
+        copies = np.abs(apart - TURN * turned).max(axis=1) < SAME_STATE
         if copies.sum() < REPEATED:
             continue
         axis = np.abs(turned[copies]).max(axis=0).argmax()

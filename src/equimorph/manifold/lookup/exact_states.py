@@ -78,6 +78,8 @@ CLOSEST = 1e-3
 NEAREST = 6
 """States over a point that are lifted across a fold nearby, and cells that are tried for a state:
 the nearest ones. Hundreds of sheets of a chain or truss lie over one point."""
+COMPARED = 256
+"""Pairs of states and guesses that are compared at once: their copies stay in the cache."""
 
 Points = Float[np.ndarray, "points P"]
 Found = tuple[Float[np.ndarray, "_ size"], Int[np.ndarray, " _"], Int[np.ndarray, " _"]]
@@ -135,13 +137,21 @@ def lift_to(
 
 def nearest_pairs(
     structure: Structure,
-    z: Float[np.ndarray, "pairs size"],
-    guess: Float[np.ndarray, "pairs size"],
+    z: Float[np.ndarray, "states size"],
+    guess: Float[np.ndarray, "guesses size"],
+    pairs: Int[np.ndarray, "2 pairs"],
     group: Int[np.ndarray, " pairs"],
 ) -> Int[np.ndarray, " chosen"]:
-    """Of pairs of states and guesses, in sorted groups, those nearest to each other."""
-    n = structure.unknowns
-    gap = (z[:, :n] - guess[:, :n]) ** 2 @ structure.mass
+    """Of pairs of states and guesses, in sorted groups, those nearest to each other.
+
+    `pairs` has the numbers of the state and the guess of each. Some are compared at a time, because
+    of thousands of states of many unknowns the copies would be longer to write than to compare.
+    """
+    n, gap = structure.unknowns, np.empty(len(group))
+    for at in range(0, len(gap), COMPARED):
+        state, number = pairs[:, at : at + COMPARED]
+        apart = z[state, :n] - guess[number, :n]
+        gap[at : at + COMPARED] = apart**2 @ structure.mass
     order = np.lexsort((gap, group))
     rank = np.arange(len(order)) - np.searchsorted(group, group[order])
     return np.sort(order[rank < NEAREST])

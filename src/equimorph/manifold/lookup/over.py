@@ -159,7 +159,8 @@ class Sheets:
         z, p = states.z, states.p
         near = self._near(p[:, self.free])
         guess = self._guess(near)
-        some = nearest_pairs(self.structure, z[near.point], guess, near.point)
+        pairs = np.stack([near.point, np.arange(len(near))])
+        some = nearest_pairs(self.structure, z, guess, pairs, near.point)
         found, good, index = exact_states(self.structure, guess[some], p[near.point[some]])
         good &= index == self.cell_index[near.cell[some]]
         good &= self._are_same(z[near.point[some]], found)
@@ -366,7 +367,7 @@ class Sheets:
         number = np.repeat(np.arange(len(hit)), last - first)
         state = np.concatenate([np.zeros(0, int), *map(np.arange, first, last)])
         guess = self._guess(near)[hit]
-        nearest = nearest_pairs(self.structure, z[state], guess[number], number)
+        nearest = nearest_pairs(self.structure, z, guess, np.stack([state, number]), number)
         number, state = number[nearest], state[nearest]
         velocity = np.zeros((len(state), p.shape[1]))
         velocity[:, self.free] = way[number]
