@@ -7,10 +7,12 @@ import pytest
 
 import equimorph as em
 from equimorph.equilibria import ParameterLine, TraceOptions, Traces, trace
+from equimorph.equilibria.curves import growing_force, newton_homotopy
 from equimorph.equilibria.rare_steps import RareSteps
 from equimorph.equilibria.trace import Batching
+from equimorph.equilibria.trace_options import EventCode
 from equimorph.errors import InputError
-from equimorph.structures import Advance, States
+from equimorph.structures import Advance, Equations, States
 from equimorph.structures.rod import Rod
 
 
@@ -72,6 +74,45 @@ def test_compiled_loops_equal_the_general_ones(
     assert compiled.why == general.why
     for one, other in zip(_columns(compiled), _columns(general), strict=True):
         np.testing.assert_array_equal(one, other)
+
+
+@pytest.mark.parametrize("count", [1, 5, 40])
+def test_compiled_loops_under_forces_equal_the_general_ones(
+    starts: States, count: int, monkeypatch: pytest.MonkeyPatch
+):
+    """Homotopies from random guesses, and pushes from states through folds."""
+    arch, some = starts.structure, starts[np.arange(count)]
+    guess = arch.sample(some.p, np.random.default_rng(3))
+    force = np.zeros_like(some.z)
+    force[:, : arch.unknowns] = 3.0 * np.random.default_rng(4).normal(size=(count, 1)) * arch.mass
+    curves = (
+        (newton_homotopy(arch, guess, some.p), guess),
+        (growing_force(arch, some.p, force, np.ones(count)), some.z),
+    )
+    options = TraceOptions(**THROUGH, largest_step=0.2, steps=200)
+    compiled = [trace(curve, z, (), options) for curve, z in curves]
+    monkeypatch.setattr(Rod, "compiled_steps", lambda *_: None)
+    for (curve, z), found in zip(curves, compiled, strict=True):
+        general = trace(curve, z, (), options)
+        assert count == 1 or (found.code == EventCode.ARRIVED).any()
+        assert found.why == general.why
+        for one, other in zip(_columns(found), _columns(general), strict=True):
+            np.testing.assert_array_equal(one, other)
+
+
+def test_a_step_under_a_force_is_that_of_the_general_solve(starts: States):
+    """The fused kernel against the bordered solve, at states that are none of equilibrium."""
+    arch, generator = starts.structure, np.random.default_rng(6)
+    p = starts.p[:9]
+    z = arch.sample(p, generator)
+    force, growth, row = generator.normal(size=(3, *z.shape))
+    closing = row, generator.normal(size=9), generator.normal(size=9)
+    fused = arch.advance_under((force, growth), z, p, *closing)
+    general = Equations.advance_under(arch, (force, growth), z, p, *closing)
+    np.testing.assert_array_equal(fused.index, general.index)
+    for name in ("dz", "dt", "tangent_z", "tangent_t", "residual"):
+        one, other = (getattr(each, name) for each in (fused, general))
+        np.testing.assert_allclose(one, other, rtol=1e-7, atol=1e-9 * np.abs(other).max())
 
 
 def test_results_of_compiled_loops_do_not_depend_on_other_lanes(starts: States):

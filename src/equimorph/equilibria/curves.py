@@ -10,7 +10,6 @@ from equimorph.arrays import Directions, Float, Lanes, Numbers, Parameters, Some
 from equimorph.linalg import Border, BorderedSolution
 from equimorph.marching.kernels import squared_lengths
 from equimorph.structures import Advance, Direction, Equations, LinearSystem, Structure
-from equimorph.structures.equations import advance_by
 
 
 @runtime_checkable
@@ -187,12 +186,8 @@ class ForceLine(PlainCurve):
         return now, self.last - self.first
 
     def advance(self, z: Lanes, t: Values, row: Lanes, corner: Values, defect: Values) -> Advance:
-        """Newton step and tangent by the general bordered solve."""
-        structure, p = self.structure, self.p
-        force, growth = self.force(t)
-        here = structure.linear_system(z, p, np.zeros((len(z), 0, p.shape[1])))
-        system = LinearSystem(here.residual - force, -growth[:, None], here.solve)
-        return advance_by(system, row, corner, defect, structure.constraints)
+        """Newton step and tangent; see `Advance`."""
+        return self.structure.advance_under(self.force(t), z, self.p, row, corner, defect)
 
 
 def growing_force(structure: Structure, p: Parameters, force: Lanes, lengths: Values) -> ForceLine:

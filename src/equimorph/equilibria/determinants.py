@@ -6,7 +6,7 @@ It costs one factorisation, and says where an eigenvalue has to be looked at; se
 import numpy as np
 
 from equimorph.arrays import Bool, Determinants, Float, Lanes, Parameters, Some
-from equimorph.equilibria.curves import Curve, ParameterLine
+from equimorph.equilibria.curves import Curve
 from equimorph.equilibria.locate import hermite
 from equimorph.equilibria.steps import Bracket
 from equimorph.linalg.determinants import in_units
@@ -24,7 +24,7 @@ computed, as a share; value, relative to the smaller one at the ends, that count
 
 def determinants(structure: Structure, z: Lanes, p: Parameters) -> Determinants:
     """Determinant of F_z at some states, m nan where it costs more than the solution."""
-    return determinant(ParameterLine(structure, p, np.zeros_like(p)), z, np.zeros(len(z)))
+    return structure.respond(z, p, np.zeros((len(z), 0, p.shape[1]))).determinant
 
 
 def determinant(curve: Curve, z: Lanes, t: Values) -> Determinants:

@@ -271,7 +271,7 @@ class _Search:
         """All rounds in the structure's loop."""
         (numbers, counts), root, rows = self._scalars, self.root, len(self._places[0])
         trial, row = self._places[5:]
-        space = Workspace(rows, root.z.shape[1], line[0].shape[1], len(steps.bounds))
+        space = Workspace(rows, line, len(steps.bounds))
         state = np.array([ticks.STEP, self.active])
         problem = (line, self.curve.metric.mass, steps.guard)
         block = (self._places, numbers, counts, self._ends, state)

@@ -91,9 +91,10 @@ class Block:
             options.smallest_step, options.locates_branch_points, curve.folds_change_index,
             options.stops, options.record,
         )  # fmt: skip
-        width = len(curve.structure.parameters)
-        self._workspace = Workspace(self.rows.capacity, curve.metric.size, width, len(constraints))
-        self._loop = self._loop_of(*compiled) if compiled else None
+        self._loop = None
+        if compiled:
+            self._workspace = Workspace(self.rows.capacity, compiled[1], len(constraints))
+            self._loop = self._loop_of(*compiled)
 
     @property
     def wanted(self) -> int:

@@ -12,6 +12,7 @@ from equimorph.columns import Columns
 from equimorph.equilibria.curves import (
     AlongCurve,
     Curve,
+    ForceLine,
     ParameterLine,
     along_parameters,
     dual,
@@ -25,7 +26,8 @@ from equimorph.model import Constraint
 from equimorph.structures import Advance
 from equimorph.structures.contract import CompiledSteps
 
-Line = tuple[Parameters, Parameters]
+Forces = Float[np.ndarray, "forced size"]
+Line = tuple[Parameters, Parameters, Forces, Forces]
 
 
 @dataclass(frozen=True)
@@ -232,33 +234,53 @@ before."""
 def compiled_steps(
     curve: Curve, z: Lanes, constraints: tuple[Constraint, ...]
 ) -> tuple[CompiledSteps, Line] | None:
-    """Loops of the structure, and starts and velocities of straight lines.
+    """Loops of the structure, and straight lines: starts, velocities, and forces at both ends.
 
     None where the arrays do not fit, or another process still compiles the loops.
     """
-    if not isinstance(curve, ParameterLine):
+    line = _line_of(curve)
+    if line is None:
         return None
-    structure = curve.structure
-    wide = (len(curve.start), len(structure.parameters))
-    fits = curve.start.shape == curve.velocity.shape == wide and z.shape[1] == structure.size
+    structure, (lanes, size) = curve.structure, z.shape
+    start, velocity, *forces = line
+    fits = (
+        start.shape == velocity.shape == (len(start), len(structure.parameters))
+        and size == structure.size
+    )
+    fits &= all(each.shape in ((0, size), (lanes, size)) for each in forces)
     steps = structure.compiled_steps(constraints) if fits else None
     if steps and (is_awaited(steps.march) or is_awaited(steps.search)):
         return None
-    line = np.ascontiguousarray(curve.start), np.ascontiguousarray(curve.velocity)
     return None if steps is None else (steps, line)
+
+
+def _line_of(curve: Curve) -> Line | None:
+    """A curve as a straight line, which may be a point, with forces; None if it is none."""
+    if isinstance(curve, ParameterLine):
+        none = np.zeros((0, curve.metric.size))
+        line = curve.start, curve.velocity, none, none
+    elif isinstance(curve, ForceLine):
+        line = curve.p, np.zeros_like(curve.p), curve.first, curve.last
+    else:
+        return None
+    start, velocity, first, last = (np.ascontiguousarray(each) for each in line)
+    return start, velocity, first, last
 
 
 class Workspace:
     """Arrays for Newton steps of rows of lanes, and for values of constraints there."""
 
-    def __init__(self, rows: int, size: int, parameters: int, constraints: int) -> None:
+    def __init__(self, rows: int, line: Line, constraints: int) -> None:
+        parameters, (forces, size) = line[0].shape[1], line[2].shape
         dz, tangent, there = np.empty((3, rows, size))
         dt, slope, residual, self._ratio = np.empty((4, rows))
         determinant, (index, at) = np.empty((rows, 2)), np.empty((2, rows), np.int64)
         p, dp, p_there = np.empty((3, rows, parameters))
         self.move = Advance(dz, dt, tangent, slope, residual, index, determinant)
         self.columns = (dz, dt, tangent, slope, residual, index, determinant, self._ratio)
-        self.scratch = (p, dp, there, p_there, at, np.empty((constraints, rows)))
+        force, growth = np.empty((2, rows if forces else 0, size))
+        found = np.empty((constraints, rows))
+        self.scratch = (p, dp, there, p_there, at, found, force, growth)
 
     def step_again(
         self,

@@ -32,7 +32,7 @@ def search_of(step, excess):
     def measure(work, tables, bounds, line, block, scratch, values):
         """The scalars at trial points: dt/ds, or the largest excess over a constraint."""
         places, numbers, counts, _, state = block
-        _, _, z, p, at, found = scratch
+        z, p, at, found = scratch[2:6]
         if bounds.shape[0] == 0:
             for i in range(state[ACTIVE]):
                 values[i] = numbers[NEW_SLOPE, i]
@@ -53,16 +53,16 @@ def search_of(step, excess):
         dz, dt, tangent, slope, residual, index, determinant, ratio = move
         trial, row = places[5], places[6]
         z, t, at, found = root
-        p, dp = scratch[0], scratch[1]
+        p, dp, force, growth = scratch[0], scratch[1], scratch[6], scratch[7]
         while state[ACTIVE] > 0:
             active = state[ACTIVE]
             if state[PHASE] == STEP:
-                lay_out(line, trial, row, numbers, counts, active, p, dp, scratch[4])
+                lay_out(line, trial, row, numbers, counts, active, scratch)
                 n = max(active, LANES)
                 step(
                     work, tables, trial[:n], p[:n], dp[:n], row[:n], numbers[CORNER, :n],
-                    numbers[DEFECT, :n], dz[:n], dt[:n], tangent[:n], slope[:n], residual[:n],
-                    index[:n], determinant[:n], ratio[:n],
+                    numbers[DEFECT, :n], force[:n], growth[:n], dz[:n], dt[:n], tangent[:n],
+                    slope[:n], residual[:n], index[:n], determinant[:n], ratio[:n],
                 )  # fmt: skip
                 state[PHASE] = CORRECT
                 if any_below(ratio, active, guard):

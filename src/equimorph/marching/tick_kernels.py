@@ -123,7 +123,7 @@ def _on_lines(line, numbers, counts, at, count, p):
     Products are stored before the sums: in one loop they would be rounded together, unlike those of
     the general path.
     """
-    start, velocity = line
+    start, velocity = line[0], line[1]
     for i in range(count):
         lane, t = counts[LANE, at[i]], numbers[TRIAL, at[i]]
         for c in range(p.shape[1]):
@@ -135,8 +135,12 @@ def _on_lines(line, numbers, counts, at, count, p):
 
 
 @njit(**{**FLAGS, "_nrt": False})
-def lay_out(line, trial, row, numbers, counts, active, p, dp, at):
-    """Parameters of trial points and their velocities; copies of the last lane fill a vector."""
+def lay_out(line, trial, row, numbers, counts, active, scratch):
+    """Parameters of trial points and their velocities; copies of the last lane fill a vector.
+
+    Where forces act, also these, and how they grow: from `line[2]` at t = 0 to `line[3]` at t = 1.
+    """
+    p, dp, at, force, growth = scratch[0], scratch[1], scratch[4], scratch[6], scratch[7]
     for i in range(active):
         at[i] = i
     _on_lines(line, numbers, counts, at, active, p)
@@ -145,6 +149,16 @@ def lay_out(line, trial, row, numbers, counts, active, p, dp, at):
         for c in range(p.shape[1]):
             dp[i, c] = line[1][lane, c]
     last = active - 1
+    if force.shape[0] > 0:
+        for i in range(max(active, LANES)):
+            lane, t = counts[LANE, min(i, last)], numbers[TRIAL, min(i, last)]
+            for j in range(force.shape[1]):
+                force[i, j], growth[i, j] = (1.0 - t) * line[2][lane, j], t * line[3][lane, j]
+        for i in range(max(active, LANES)):
+            lane = counts[LANE, min(i, last)]
+            for j in range(force.shape[1]):
+                force[i, j] += growth[i, j]
+                growth[i, j] = line[3][lane, j] - line[2][lane, j]
     for i in range(active, LANES):
         for j in range(row.shape[1]):
             trial[i, j], row[i, j] = trial[last, j], row[last, j]
@@ -240,7 +254,7 @@ def march_of(step, excess):
     Parameters
     ----------
     step, excess
-        Kernels ``step(work, tables, z, p, dp, row, corner, defect, *move)``, and
+        Kernels ``step(work, tables, z, p, dp, row, corner, defect, force, growth, *move)``, and
         ``excess(work, tables, z, p, bounds, found)`` for values of constraints (constraints, rows),
         if there are any. They need at least a vector of rows; `work` are their arrays, `tables`
         what lanes share.
@@ -252,7 +266,7 @@ def march_of(step, excess):
         places, _, numbers, counts, values, grazing, state = block
         if grazing.shape[0] == 0:
             return
-        _, _, z, p, at, found = scratch
+        z, p, at, found = scratch[2:6]
         count = gather(line, places[2], numbers, counts, state[ACTIVE], z, p, at)
         if count > 0:
             excess(work, tables, z[:count], p[:count], bounds, found)
@@ -270,7 +284,7 @@ def march_of(step, excess):
         dz, dt, tangent, slope, residual, index, determinant, ratio = move
         step_of = (dz, tangent, slope, index, determinant)
         _, _, trial, row = places
-        p, dp = scratch[0], scratch[1]
+        p, dp, force, growth = scratch[0], scratch[1], scratch[6], scratch[7]
         smallest, locates, plain, _, records = rules
         while True:
             if state[PHASE] == STEP:
@@ -278,12 +292,12 @@ def march_of(step, excess):
                 if _is_idle(state, lanes, files, trial.shape[0], (most_events, more, records)):
                     return IDLE
                 active = state[ACTIVE]
-                lay_out(line, trial, row, numbers, counts, active, p, dp, scratch[4])
+                lay_out(line, trial, row, numbers, counts, active, scratch)
                 n = max(active, LANES)
                 step(
                     work, tables, trial[:n], p[:n], dp[:n], row[:n], numbers[CORNER, :n],
-                    numbers[DEFECT, :n], dz[:n], dt[:n], tangent[:n], slope[:n], residual[:n],
-                    index[:n], determinant[:n], ratio[:n],
+                    numbers[DEFECT, :n], force[:n], growth[:n], dz[:n], dt[:n], tangent[:n],
+                    slope[:n], residual[:n], index[:n], determinant[:n], ratio[:n],
                 )  # fmt: skip
                 state[PHASE] = CORRECT
                 _pass_over(counts, active, ratio)

@@ -38,6 +38,8 @@ from equimorph.tables import html_table
 class CompiledSteps:
     """Loops over the kernels of a structure: they follow straight lines in its parameters.
 
+    Forces on the unknowns may change along these, too.
+
     Their results are those of `Structure.advance` and of the constraints.
 
     Parameters

@@ -49,6 +49,10 @@ class Response:
     ratio: Values
 
 
+Force = tuple[Lanes, Lanes]
+"""A force on the unknowns, which F equals along a curve, and its growth."""
+
+
 @dataclass(frozen=True)
 class CompiledNewton:
     """Newton's method as one loop over the kernel of a structure's step.
@@ -203,11 +207,28 @@ class Equations(ABC):
         system = self.linear_system(z, p, dp[:, None])
         return advance_by(system, row, corner, defect, self.constraints)
 
+    def advance_under(
+        self, force: Force, z: Lanes, p: Parameters, row: Lanes, corner: Values, defect: Values
+    ) -> Advance:
+        """One Newton step at fixed parameters along ``F(z; p) = force``, which grows."""
+        (now, growth), width = force, p.shape[1]
+        here = self.linear_system(z, p, np.zeros((len(z), 0, width)))
+        system = LinearSystem(here.residual - now, -growth[:, None], here.solve)
+        return advance_by(system, row, corner, defect, self.constraints)
+
     fused_directions: int = 0
     """Most directions with which `respond` costs less than `linear_system` with its solves."""
 
     def respond(self, z: Lanes, p: Parameters, directions: Directions) -> Response:
-        """One Newton step at fixed parameters, and the tangents along at least one direction."""
+        """One Newton step at fixed parameters, and the tangents along some directions.
+
+        Without directions only index and determinant need be told.
+        """
+        if directions.shape[1] == 0:
+            still, one, none = np.zeros_like(z), np.ones(len(z)), np.zeros(len(z))
+            here = self.advance(z, p, np.zeros_like(p), still, one, none)
+            told = here.index, here.determinant, np.full(len(z), np.nan)
+            return Response(here.dz, np.zeros((len(z), 0, self.size)), *told)
         (lanes, k), size = directions.shape[:2], self.size
         # one call for all directions: calls cost more than lanes
         many, dp = k * lanes, directions.transpose(1, 0, 2).reshape(k * lanes, -1)

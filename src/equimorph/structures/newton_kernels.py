@@ -127,12 +127,12 @@ def newton_of(step):
             dp, row = np.zeros(p.shape), np.zeros((rows, size))
         dz, tangent_z = np.empty((rows, size)), np.empty((rows, size))
         dt, tangent_t, residual = np.empty(rows), np.empty(rows), np.empty(rows)
-        determinant, ratio = np.empty((rows, 2)), np.empty(rows)
+        determinant, ratio, still = np.empty((rows, 2)), np.empty(rows), np.empty((0, size))
         while left > 0 and number < most:
             m = max(left, LANES)
             step(
-                work, tables, z[:m], p[:m], dp, row, corner, none, dz, dt, tangent_z, tangent_t,
-                residual, index, determinant, ratio,
+                work, tables, z[:m], p[:m], dp, row, corner, none, still, still, dz, dt, tangent_z,
+                tangent_t, residual, index, determinant, ratio,
             )  # fmt: skip
             if any_below(ratio, left, guard):
                 break

@@ -21,11 +21,19 @@ from equimorph.structures.equations import (
     CompiledNewton,
     Direction,
     Enclosed,
+    Force,
     LinearSystem,
     Response,
     Shift,
 )  # fmt: skip
 from equimorph.structures.resolution import Refinable
+from equimorph.structures.rod.arclengths import (
+    Arclengths,
+    arclengths,
+    name_at,
+    read_end,
+    read_fraction,
+)
 from equimorph.structures.rod.centreline import Centreline, arcs_through, closest_approach
 from equimorph.structures.rod.discretisation import Mesh
 from equimorph.structures.rod.inertia import HeavyRod
@@ -46,42 +54,13 @@ TOUCHING = 1e-9
 """Distance, as a share of the length, at which a rod without a thickness touches itself."""
 COORDINATES = ("x", "height", "z")
 """Names of the descriptors of coordinates."""
-FRACTIONS = (3, 6, 7, 9, 11, 12)
-"""Denominators of arclengths that descriptors write as fractions."""
 _SYMBOLS = {0.5: "½", 1 / 3: "1/3", 2 / 3: "2/3", 0.25: "¼", 0.75: "¾"}
 
-Arclengths = Float[np.ndarray, " points"]
 Field = Callable[[Lanes, Parameters, Arclengths], Values]
 """Values of a field, one a lane, at one arclength."""
 Peaks = Float[np.ndarray, "lanes peaks"]
 Branches = Callable[[Lanes, Parameters], tuple[Peaks, Peaks]]
 """Local maxima along the rod, and their arclengths."""
-
-
-def read_fraction(text: str) -> float:
-    """Number written like ``0.5`` or ``1/3``."""
-    try:
-        above, _, below = text.partition("/")
-        return float(above) / float(below or 1.0)
-    except (ValueError, ZeroDivisionError):
-        raise InputError(f"`s` must be a number or a fraction like 1/3; got {text!r}.") from None
-
-
-def read_end(text: str) -> int | str:
-    """End 0 or 1 of a rod; another text as it is, which is refused."""
-    return int(text) if text in ("0", "1") else text
-
-
-def name_at(name: str, s: float) -> str:
-    """Name at an arclength, from which the arclength is read back exactly: ``height(1/3)``."""
-    nice = (f"{s:.6g}", *(f"{round(s * below)}/{below}" for below in FRACTIONS))
-    exact = (text for text in nice if read_fraction(text) == s)
-    return f"{name}({next(exact, repr(s))})"
-
-
-def arclengths(s: Arclengths | None) -> Arclengths:
-    """The given arclengths, by default 101 equidistant ones."""
-    return np.linspace(0.0, 1.0, 101) if s is None else np.asarray(s, dtype=float)
 
 
 class AnyRod(HeavyRod, Refinable):
@@ -197,6 +176,12 @@ class AnyRod(HeavyRod, Refinable):
     ) -> Advance:
         """One Newton step, with tangent and inertia."""
         return self.mechanics.advance(z, p, dp, row, corner, defect)
+
+    def advance_under(
+        self, force: Force, z: Lanes, p: Parameters, row: Lanes, corner: Values, defect: Values
+    ) -> Advance:
+        """One Newton step under a force."""
+        return self.mechanics.advance_under(force, z, p, row, corner, defect)
 
     def respond(self, z: Lanes, p: Parameters, directions: Directions) -> Response:
         """One Newton step, with tangents along directions."""

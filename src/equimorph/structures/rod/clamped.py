@@ -29,6 +29,7 @@ from equimorph.structures.equations import (
     AnyBorder,
     CompiledNewton,
     Direction,
+    Force,
     LinearSystem,
     Response,
     Shift,
@@ -42,7 +43,7 @@ from equimorph.structures.rod.clamped_derivative_kernels import (
     second_lanes,
 )
 from equimorph.structures.rod.clamped_fields import ClampedFields
-from equimorph.structures.rod.clamped_kernels import advance_lanes
+from equimorph.structures.rod.clamped_kernels import advance_lanes, advance_under_lanes
 from equimorph.structures.rod.clamped_march_kernels import march_lanes, newton_lanes, search_lanes
 from equimorph.structures.rod.clamped_response_kernels import MOST, respond_lanes
 from equimorph.structures.rod.discretisation import Mesh
@@ -231,6 +232,21 @@ class ClampedMechanics(PlanarMechanics):
         """One fused kernel."""
         given = (z, p, dp, row, corner, defect)
         return self.fused_advance(advance_lanes, self._step_data, *given)
+
+    def advance_under(
+        self, force: Force, z: Lanes, p: Parameters, row: Lanes, corner: Values, defect: Values
+    ) -> Advance:
+        """One fused kernel; lanes with an unsafe pivot take the general solve."""
+        z, p = self.check_widths((z, p))
+        given = z, p, np.zeros_like(p), row, corner, defect, *force
+        out, ratio = self.fused_step(advance_under_lanes, self._step_data, *given)
+        unsafe = np.flatnonzero(~(ratio >= PIVOT_GUARD))
+        if len(unsafe):
+            some = (each[unsafe] for each in (z, p, row, corner, defect))
+            again = super().advance_under((force[0][unsafe], force[1][unsafe]), *some)
+            for name, column in vars(again).items():
+                getattr(out, name)[unsafe] = column
+        return out
 
     def correction(self, z: Lanes, p: Parameters) -> Advance:
         """The fused kernel, whose steps are exact enough down to smaller pivots."""

@@ -86,6 +86,32 @@ def _read_closing(dp, row, corner, defect, start, n, closing_row, closing):
 
 
 @njit(**INNER)
+def _read_force(force, growth, start, n, forces, sums):
+    """Fill two rows for each node with a force on it and its growth, and subtract them from sums.
+
+    Without a force its arrays have no rows.
+    """
+    if force.shape[0] == 0:
+        return
+    read_lanes(force, start * (n + 2), n + 2, n, forces, 2, 2)
+    read_lanes(growth, start * (n + 2), n + 2, n, forces, 3, 2)
+    for k in range(LANES):
+        at = start + k
+        for a in range(2):
+            sums[ALONG + a, k] -= force[at, n + a]
+            sums[CLOSE_ALONG + a, k] -= growth[at, n + a]
+
+
+@njit(**INNER)
+def _add_force(nodes, last, forces, columns):
+    """Add the force on inner nodes, and its growth, to their columns."""
+    for i in range(max(nodes[0], 1), min(nodes[1], last)):
+        at = i * TILE
+        store(columns, at + FORCE, load(columns, at + FORCE) + load(forces, 2 * i))
+        store(columns, at + COLUMN, load(columns, at + COLUMN) - load(forces, 2 * i + 1))
+
+
+@njit(**INNER)
 def _assemble(
     weights, loads, nodes, theta, scalars, closing_row, velocity, diagonal, columns, sums
 ):
@@ -179,7 +205,7 @@ def add_end(stiffness, e, end, velocity, slot, close, columns, sums):
 @njit(**INNER)
 def assemble_group(
     stiffness, halves, group, weights, loads, theta, scalars, closing_row, closing,
-    diagonal, columns, pairs, sums,
+    diagonal, columns, pairs, sums, forces, forced,
 ):  # fmt: skip
     """Everything that the elements of a group need before they are reduced."""
     elements, degree = stiffness.shape[0], stiffness.shape[1] - 1
@@ -187,6 +213,8 @@ def assemble_group(
     nodes = (begin * degree + (begin > 0), end * degree + 1)
     velocity = load(closing, LOAD)
     _assemble(weights, loads, nodes, theta, scalars, closing_row, velocity, diagonal, columns, sums)
+    if forced:
+        _add_force(nodes, elements * degree, forces, columns)
     for e in range(begin, end):
         _subtract_stiffness(halves, e, degree + 1, theta, columns, pairs, sums)
     if begin == 0:
@@ -261,9 +289,22 @@ def advance_lanes(
     dz, dt, tangent_z, tangent_t, residual, index, determinant, ratio,
 ):  # fmt: skip
     """Fused Newton step, tangent and inertia of the rod; see `structures.contract.Advance`."""
+    none = np.empty((0, z.shape[1]))
     advance_in(
         advance_work(stiffness), stiffness, ends, weights, loads, z, p, dp, row, corner, defect,
-        dz, dt, tangent_z, tangent_t, residual, index, determinant, ratio,
+        none, none, dz, dt, tangent_z, tangent_t, residual, index, determinant, ratio,
+    )  # fmt: skip
+
+
+@njit(**FLAGS)
+def advance_under_lanes(
+    stiffness, ends, weights, loads, z, p, dp, row, corner, defect, force, growth,
+    dz, dt, tangent_z, tangent_t, residual, index, determinant, ratio,
+):  # fmt: skip
+    """The same for F less a force on the unknowns that grows."""
+    advance_in(
+        advance_work(stiffness), stiffness, ends, weights, loads, z, p, dp, row, corner, defect,
+        force, growth, dz, dt, tangent_z, tangent_t, residual, index, determinant, ratio,
     )  # fmt: skip
 
 
@@ -279,32 +320,34 @@ def advance_work(stiffness):
     return (
         theta, closing_row, diagonal, scalars, closing, sums, products, small, solution,
         *work_arrays(elements, inner, ONE_TILE), halved(stiffness), work_rows(inner + 3),
+        work_rows(2 * (n + 2)),
     )  # fmt: skip
 
 
 @njit(**INNER)
 def advance_in(
-    work, stiffness, ends, weights, loads, z, p, dp, row, corner, defect,
+    work, stiffness, ends, weights, loads, z, p, dp, row, corner, defect, force, growth,
     dz, dt, tangent_z, tangent_t, residual, index, determinant, ratio,
 ):  # fmt: skip
-    """`advance_lanes` in work arrays.
+    """`advance_under_lanes` in work arrays; without a force its arrays have no rows.
 
     With H = LDLᵀ, products bᵀH⁻¹c need the forward-reduced columns only; the step and the tangent
     are combined from these before the one back-substitution.
     """
     theta, closing_row, diagonal, scalars, closing, sums, products, small, solution = work[:9]
-    lower, vertices, columns, extremes, halves, pairs = work[9:]
-    elements, inner = stiffness.shape[0], stiffness.shape[1] - 2
+    lower, vertices, columns, extremes, halves, pairs, forces = work[9:]
+    forced, elements, inner = force.shape[0] > 0, stiffness.shape[0], stiffness.shape[1] - 2
     lanes, n = z.shape[0], z.shape[1] - 2
     for block in range(0, lanes, LANES):
         start = min(block, lanes - LANES)
         read_state(z, p, start, n, theta, scalars)
         _read_closing(dp, row, corner, defect, start, n, closing_row, closing)
         start_sums(scalars, closing, sums, products)
+        _read_force(force, growth, start, n, forces, sums)
         for group in range((elements + GROUP - 1) // GROUP):
             assemble_group(
                 stiffness, halves, group, weights, loads, theta, scalars, closing_row, closing,
-                diagonal, columns, pairs, sums,
+                diagonal, columns, pairs, sums, forces, forced,
             )  # fmt: skip
             if group == 0:
                 start_block(diagonal, vertices, extremes)

@@ -16,13 +16,13 @@ from equimorph.structures.rod.clamped_kernels import advance_in, advance_work
 
 @njit(**{**FLAGS, "_nrt": False})
 def _step(
-    work, tables, z, p, dp, row, corner, defect,
+    work, tables, z, p, dp, row, corner, defect, force, growth,
     dz, dt, tangent_z, tangent_t, residual, index, determinant, ratio,
 ):  # fmt: skip
     stiffness, ends, weights, loads = tables[0]
     advance_in(
         work[0], stiffness, ends, weights, loads, z, p, dp, row, corner, defect,
-        dz, dt, tangent_z, tangent_t, residual, index, determinant, ratio,
+        force, growth, dz, dt, tangent_z, tangent_t, residual, index, determinant, ratio,
     )  # fmt: skip
 
 

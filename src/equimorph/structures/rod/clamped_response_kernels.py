@@ -170,10 +170,13 @@ def respond_lanes(
     stiffness, ends, weights, loads, z, p, directions,
     dz, tangents, index, determinant, ratio,
 ):  # fmt: skip
-    """Newton step, inertia, and tangents (lanes, k, size) along directions, k ≤ `MOST`."""
+    """Newton step, inertia, and tangents (lanes, k, size) along directions, k ≤ `MOST`.
+
+    Without directions only the inertia is told, which needs no substitution back.
+    """
     work = advance_work(stiffness)
     theta, closing_row, diagonal, scalars = work[:4]
-    lower, vertices, columns, extremes, halves, pairs = work[9:]
+    lower, vertices, columns, extremes, halves, pairs, forces = work[9:]
     elements, inner = stiffness.shape[0], stiffness.shape[1] - 2
     (lanes, k, _), n = directions.shape, z.shape[1] - 2
     products, small, closing = work[6], work_rows(2 * WIDTH), work_rows(MOST * DATA)
@@ -188,7 +191,7 @@ def respond_lanes(
         for group in range((elements + GROUP - 1) // GROUP):
             assemble_group(
                 stiffness, halves, group, weights, loads, theta, scalars, closing_row, closing,
-                diagonal, columns, pairs, sums,
+                diagonal, columns, pairs, sums, forces, False,
             )  # fmt: skip
             _add_directions(stiffness, group, rho, closing, columns, sums)
             if group == 0:
@@ -202,6 +205,13 @@ def respond_lanes(
         store(extremes, 0, load(extremes, 0) + negative_of_two(small, 0, WIDTH))
         square = load(small, 0) * load(small, WIDTH + 1) - load(small, 1) * load(small, WIDTH)
         store(extremes, 4, square / load(extremes, 4))
+        for lane in range(LANES):
+            at = start + lane
+            index[at] = np.int64(extremes[0, lane]) - 2
+            write_determinant(extremes, lane, determinant, at)
+            ratio[at] = pivot_ratio(extremes, lane)
+        if k == 0:
+            continue
         solve_lanes(small, 2, WIDTH)
         for e in range(elements, -1, -1):
             node = e * (inner + 1)
@@ -221,8 +231,3 @@ def respond_lanes(
         for c in range(k):
             position = (start * k + c) * (n + 2)
             write_lanes(solution, SIDES + 1 + c, SIDES, tangents, position, k * (n + 2), n + 2)
-        for lane in range(LANES):
-            at = start + lane
-            index[at] = np.int64(extremes[0, lane]) - 2
-            write_determinant(extremes, lane, determinant, at)
-            ratio[at] = pivot_ratio(extremes, lane)

@@ -15,7 +15,8 @@ from equimorph.errors import MissingError
 from equimorph.structures.contract import Readers, Written
 from equimorph.structures.material_points import MaterialPoints
 from equimorph.structures.rod.any_description import RodDescription
-from equimorph.structures.rod.any_rod import AnyRod, Arclengths
+from equimorph.structures.rod.any_rod import AnyRod
+from equimorph.structures.rod.arclengths import Arclengths
 from equimorph.structures.rod.centreline import Centreline
 from equimorph.structures.rod.fibres import Fibres, Stressed
 from equimorph.structures.rod.mechanics import PlanarMechanics

@@ -13,7 +13,8 @@ from equimorph.errors import InputError
 from equimorph.model import Descriptor, remember_call
 from equimorph.structures.contract import Written
 from equimorph.structures.material_points import MaterialPoints
-from equimorph.structures.rod.any_rod import Arclengths, Field, Peaks, arclengths
+from equimorph.structures.rod.any_rod import Field, Peaks
+from equimorph.structures.rod.arclengths import Arclengths, arclengths
 from equimorph.structures.rod.centreline import Centreline
 from equimorph.structures.rod.extrema import peaks, stations
 from equimorph.structures.rod.fibres import Sizes, Strains
