@@ -275,9 +275,8 @@ class Sheets:
     @cached_property
     def _rims(self) -> Rims:
         """Bands along folds and constraints, which straight cells miss."""
-        whole = self.whole
+        whole, beside = self.whole, self.whole.beside
         on = (self.folded | self.capped)[whole.facets].all(axis=1)
-        beside = whole.beside
         index = np.where(beside >= 0, self.cell_index[beside], self.cell_index[beside[:, :1]])
         on &= (whole.counts != 2) | (index != index[:, :1]).any(axis=1)
         return Rims.of(self.points.p[:, self.free], whole, np.flatnonzero(on))
