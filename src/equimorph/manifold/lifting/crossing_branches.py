@@ -133,7 +133,11 @@ def edge_lines(pairing: Pairing, edges: Items) -> ParameterLine:
 
 
 def lead_out(
-    pairing: Pairing, halves: Items, edges: Items, line: ParameterLine, front: Front
+    pairing: Pairing,
+    halves: Int[np.ndarray, " m"],
+    edges: Int[np.ndarray, " m"],
+    line: ParameterLine,
+    front: Front,
 ) -> tuple[Seeds, Inside, dict[int, Place]]:
     """Equilibria over vertices that half-branches over edges lead to, and points inside edges.
 
