@@ -27,7 +27,7 @@ def aside(rod, states):
 def test_the_arch_over_theta_and_load_has_two_sheets_aside_that_are_mirror_images():
     """Stable beside the plane between both loads only, ± z each; in the plane elsewhere.
 
-    States twisted by two whole turns, whose bending the bound allows, need shorter elements than it.
+    States twisted by two whole turns, whose bending the bound allows, need shorter elements.
     """
     rod = em.SpatialRod(torsion=0.77, lateral=1.0).resolving(15.0)
     assert "sideways mirror" in [each.name for each in rod.symmetries()]

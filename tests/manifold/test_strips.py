@@ -147,3 +147,21 @@ def test_strips_that_get_narrower_end_at_their_own_tip(slant, grid):
     )
     beyond = eset.over(a=slant * b + 1.3 * inside / 0.7, b=b)
     assert len(beyond.states.z) == 0
+
+
+@pytest.mark.parametrize(("width", "grid"), [(0.1, (6, 6)), (0.2, (11, 8))])
+def test_states_over_strips_narrower_than_their_bulge_are_found(width, grid):
+    """Chords of a parabola lie up to five widths beside it: 21 of 10 800 points in 36 sets failed.
+
+    Roots of x² = a − 0.4 b² are −√ for 2√ ≤ width, and √ for √ ≤ width.
+    """
+    eset = bounded(PARABOLA, width, grid)
+    rng = np.random.default_rng(0)
+    b, level = rng.uniform(-1.0, 1.2, 300), rng.uniform(0.0, 1.3 * width**2, 300)
+    level[:100] *= 0.3
+    inside = level + 0.4 * b**2 < 1.1
+    b, root = b[inside], np.sqrt(level[inside])
+    found = eset.over(a=root**2 + 0.4 * b**2, b=b)
+    count = np.bincount(found.point, minlength=len(b))
+    np.testing.assert_array_equal(count, (root <= width) * 1 + (2.0 * root <= width))
+    np.testing.assert_allclose(np.abs(found.states.z[:, 0]), root[found.point], atol=1e-9)

@@ -122,7 +122,7 @@ def root_shares(weights, folded, closest):
 def guesses(hits, cells, folded, z, closest):
     """Interpolation between the corners of cells, at their points nearest to those of hits.
 
-    hits: cell, weights.
+    Beyond a facet on folds, at the mirror images of points. hits: cell, weights.
     """
     cell, weights = hits
     count, corners, size = len(cell), cells.shape[1], z.shape[1]
@@ -130,9 +130,14 @@ def guesses(hits, cells, folded, z, closest):
     share, at_fold = np.empty((1, corners)), np.empty((1, corners), np.bool_)
     for i in range(count):
         own, total = cells[cell[i]], 0.0
+        regular = 0
+        for k in range(corners):
+            at_fold[0, k] = folded[own[k]]
+            regular += not at_fold[0, k]
         for k in range(corners):
             share[0, k] = max(weights[i, k], 0.0)
-            at_fold[0, k] = folded[own[k]]
+            if regular == 1 and not at_fold[0, k]:
+                share[0, k] = abs(weights[i, k])
             total += share[0, k]
         for k in range(corners):
             share[0, k] /= total
@@ -214,10 +219,10 @@ def balanced(hits, good, kept, sheets, count):
     """Points over which states and cells have the same sum of (−1)^index, and no cell failed.
 
     hits: point, cell, inside; kept: hits whose states are different; sheets, one entry a cell: sign
-    of its index, whether it is overturned, at an edge, at a constraint.
+    of its index, whether it is overturned, at an edge, at a constraint, and there at no fold.
     """
     point, cell, inside = hits
-    sign, overturned, edge, capped = sheets
+    sign, overturned, edge, capped, ended = sheets
     surplus, sure = np.zeros(count, np.int64), np.ones(count, np.bool_)
     for i in range(len(point)):
         c = cell[i]
@@ -226,8 +231,9 @@ def balanced(hits, good, kept, sheets, count):
         if not good[i] and (capped[c] or (inside[i] and not edge[c])):
             sure[point[i]] = False
     for i in kept:
-        # a state just beyond the straight edge of a constraint has no cell above the point
-        if inside[i] or not capped[cell[i]]:
+        # a state just beyond the straight edge of a constraint has no cell above the point; in
+        # strips from a constraint to a fold it may lie beyond the fold, where it has a partner
+        if inside[i] or not ended[cell[i]]:
             surplus[point[i]] += sign[cell[i]]
     for i in range(count):
         sure[i] = sure[i] and surplus[i] == 0

@@ -119,9 +119,10 @@ class Sheets:
 
     @cached_property
     def _of_cells(self) -> tuple[np.ndarray, ...]:
-        """Sign by index, and whether cells are overturned, at an edge, at a constraint."""
+        """Sign by index; whether overturned, at an edge, at a constraint, there at no fold."""
         capped = np.asarray(self.capped[self.cells].any(axis=1))
-        return 1 - 2 * (self.cell_index % 2), self._overturned, self._at_an_edge, capped
+        ended = capped & ~self.folded[self.cells].any(axis=1)
+        return 1 - 2 * (self.cell_index % 2), self._overturned, self._at_an_edge, capped, ended
 
     @cached_property
     def _overturned(self) -> CellFlags:
@@ -239,8 +240,7 @@ class Sheets:
         if len(tried) == 0:
             return (np.zeros((0, self.points.z.shape[1])), tried, tried), None
         hits = near.take(tried)
-        at = p[hits.point]
-        guess = self._guess(hits)
+        at, guess = p[hits.point], self._guess(hits)
         wanted, room = self.cell_index[hits.cell], self._room[hits.cell]
         z, good, index = exact_states(self.structure, guess, at, wanted)
         mass, converged = self.structure.mass, good.copy()
@@ -249,7 +249,7 @@ class Sheets:
         sure = balanced((hits.point, hits.cell, hits.inside), good, found, self._of_cells, len(p))
         # in a tongue all corners may be near its folds, and states between them far from their own;
         # beside a side of the box guesses may lead across the fold of a narrow strip
-        sure[hits.point[converged & ~good & hits.inside]] = False
+        sure[hits.point[converged & ~good & (hits.inside | (index == wanted))]] = False
         doubtful = None
         if not sure.all():
             found = found[sure[hits.point[found]]]
