@@ -28,6 +28,7 @@ from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.manifold.complex.excerpts import excerpt_of, sheets_of
 from equimorph.manifold.complex.joins import groups_of, joined
 from equimorph.manifold.complex.kept_tables import places_of
+from equimorph.manifold.complex.marked_complex import TETRAHEDRA
 from equimorph.manifold.complex.pinches import ON_SIDE, pinched_vertices
 from equimorph.manifold.complex.vertices import Vertices
 from equimorph.manifold.geometry.exact_points import Aim, Pinned, correct_points
@@ -169,9 +170,12 @@ class _Trim:
         """The set with singular vertices beyond sides as one with those of their fold nearby.
 
         Where a fold leads through a corner of the box, it has several at the corner, closer to each
-        other than sides were moved. What lies beyond sides would leave a void between these.
+        other than sides were moved. What lies beyond sides would leave a void between these, over
+        three parameters. Over two there is none to leave, and folds meet in cusps in corners.
         """
         eset = self.eset
+        if len(self.box.names) < TETRAHEDRA:
+            return eset
         whole, place = replace(_whole(eset), fresh=None), eset.coordinates
         ends = [
             facets[:, list(two)]
@@ -204,7 +208,8 @@ class _Trim:
         place, slack = whole.points.p[:, self.eset.setting.free], ON_SIDE * (box.upper - box.lower)
         on = [np.abs(place - bound) <= slack for bound in (box.lower, box.upper)]
         inside = ~np.concatenate(on, axis=1)[known.facets].all(axis=1).any(axis=1)
-        pinched = len(pinched_vertices(whole.cells, known, len(place)))
+        voids = len(box.names) == TETRAHEDRA  # over fewer parameters cells enclose none
+        pinched = len(pinched_vertices(whole.cells, known, len(place))) if voids else 0
         return np.array([(known.counts > 2).sum(), (inside & (known.counts == 1)).sum(), pinched])
 
     @cached_property

@@ -81,11 +81,10 @@ def grid_mesh(lines: Lines) -> BaseMesh:
 def coarse_grid(
     lines: Lines, intervals: int, limits: Float[np.ndarray, "2 d"]
 ) -> tuple[BaseMesh, Int[np.ndarray, " vertices"]]:
-    """Mesh on selected lines of a grid, and on one or two beyond each side, within limits.
+    """Mesh on selected lines of a grid, and on a few beyond it, within limits.
 
-    The number of its intervals along each parameter is limited. There is one line beyond a side
-    where two would lie closer than those of the grid. Returned with it are the grid's numbers of
-    its vertices, −1 for those beyond the grid.
+    The number of its intervals along each parameter is limited. Returned with it are the grid's
+    numbers of its vertices, −1 for those beyond the grid.
     """
     counts = [len(line) - 1 for line in lines]
     chosen, wide = [], []
@@ -94,11 +93,9 @@ def coarse_grid(
         margin = MARGIN * (line[-1] - line[0])
         first = max(line[0] - margin, 0.5 * (line[0] + low))
         last = min(line[-1] + margin, 0.5 * (line[-1] + high))
-        beyond = 1 if count < 2.0 / MARGIN else 2
-        before = np.linspace(first, line[0], beyond + 1)[:-1]
-        after = np.linspace(line[-1], last, beyond + 1)[1:]
+        before, after = np.linspace(first, line[0], 3)[:-1], np.linspace(line[-1], last, 3)[1:]
         wide.append(np.concatenate([before, line[own], after]))
-        chosen.append(np.pad(own, beyond, constant_values=-1))
+        chosen.append(np.concatenate([[-1, -1], own, [-1, -1]]))
     places = np.stack([place.ravel() for place in np.meshgrid(*chosen, indexing="ij")])
     number = np.ravel_multi_index(list(np.maximum(places, 0)), tuple(n + 1 for n in counts))
     return grid_mesh(tuple(wide)), np.where((places >= 0).all(axis=0), number, -1)
