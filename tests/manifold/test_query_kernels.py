@@ -66,14 +66,16 @@ def test_cells_near_points_are_those_whose_barycentric_coordinates_say_so(d):
 
 
 def test_guesses_interpolate_and_follow_the_root_from_folds():
-    """The formulas of both, hit by hit."""
+    """The formulas of both, hit by hit; beyond a facet on folds at the mirror image."""
     x, cells = sheets(2)
     generator = np.random.default_rng(0)
     z, folded = generator.normal(size=(len(x), 5)), generator.uniform(size=len(x)) < 0.4
     cell = generator.integers(len(cells), size=50)
     weights = generator.normal(0.3, 0.3, size=(50, 3))
     found = guesses((cell, weights), cells, folded, z, CLOSEST)
-    within = np.maximum(weights, 0.0)
+    regular = ~folded[cells[cell]]
+    mirrored = regular & (regular.sum(axis=1, keepdims=True) == 1)
+    within = np.where(mirrored, np.abs(weights), np.maximum(weights, 0.0))
     within /= within.sum(axis=1, keepdims=True)
     for guess, own, share in zip(found, cells[cell], within, strict=True):
         np.testing.assert_allclose(guess, plain_root(share, folded[own]) @ z[own], atol=1e-9)
@@ -109,16 +111,22 @@ def test_points_are_sure_where_states_and_cells_have_the_same_parity():
     inside = np.ones(8, bool)
     nothing = np.zeros(2, bool)
     good = np.array([True, True, True, False, False, False, True, True])
-    of_cells = np.array([1, -1]), nothing, nothing, nothing
+    of_cells = np.array([1, -1]), nothing, nothing, nothing, nothing
     sure = balanced((point, cell, inside), good, np.flatnonzero(good), of_cells, 4)
     assert sure.tolist() == [True, False, False, True]
     # at a fold both may be missing; next to a constraint nothing may
-    edge = np.array([1, -1]), nothing, ~nothing, nothing
+    edge = np.array([1, -1]), nothing, ~nothing, nothing, nothing
     sure = balanced((point, cell, inside), good, np.flatnonzero(good), edge, 4)
     assert sure.tolist() == [True, False, True, True]
-    capped = np.array([1, -1]), nothing, ~nothing, ~nothing
+    capped = np.array([1, -1]), nothing, ~nothing, ~nothing, ~nothing
     sure = balanced((point, cell, inside), good, np.flatnonzero(good), capped, 4)
     assert sure.tolist() == [True, False, False, True]
+    # one state beside a cell lies beyond its constraint, or beyond the fold of a strip
+    for ended in (~nothing, nothing):
+        beside = np.array([1, -1]), nothing, ~nothing, ~nothing, ended
+        one = np.zeros(1, int), np.zeros(1, int), np.zeros(1, bool)
+        sure = balanced(one, np.ones(1, bool), np.zeros(1, int), beside, 1)
+        assert sure.tolist() == [bool(ended[0])]
 
 
 def test_points_beyond_a_brim_or_within_a_nudge_of_it_are_tried():
