@@ -247,7 +247,7 @@ class Sheets:
         good &= (index == wanted) & (self.structure.resolved(z, at) | self._unresolved[hits.cell])
         found = one_of_each((hits.point, hits.inside), (z, good), guess, room, mass, SAME_STATE)
         sure = balanced((hits.point, hits.cell, hits.inside), good, found, self._of_cells, len(p))
-        # in a tongue all corners may be near its folds, and states between them far from their own;
+        # in a tongue or sliver all corners may be near its folds, and states there far from theirs;
         # beside a side of the box guesses may lead across the fold of a narrow strip
         sure[hits.point[converged & ~good & (hits.inside | (index == wanted))]] = False
         doubtful = None
