@@ -18,18 +18,12 @@ Column = Shaped[np.ndarray, " rows"] | Sequence[object]
 
 @dataclass(frozen=True)
 class Table:
-    """Columns of one length by name, with units.
-
-    Parameters
-    ----------
-    columns
-        Numbers or texts, one for each row; None and NaN are empty cells of files.
-    units
-        By the name of the column; the others are texts, or numbers without a unit.
-    """
+    """Columns of one length by name, with units."""
 
     columns: Mapping[str, Column]
+    """Numbers or texts, one for each row; None and NaN are empty cells of files."""
     units: Mapping[str, str] = field(default_factory=dict)
+    """By the name of the column; the others are texts, or numbers without a unit."""
 
     def rows(self) -> list[list[str]]:
         """Texts of all cells, below the heads ``name (unit)``."""

@@ -39,21 +39,14 @@ Square = Float[np.ndarray, "lanes d d"]
 
 @dataclass(frozen=True, eq=False)
 class Scalars:
-    """As many scalars of states as a set has free parameters.
-
-    Parameters
-    ----------
-    setting
-        Structure and free parameters of the set.
-    scalars
-        The scalars; free parameters are descriptors that read them.
-    places
-        Place of the parameter that each scalar is, −1 for descriptors.
-    """
+    """As many scalars of states as a set has free parameters."""
 
     setting: Setting
+    """Structure and free parameters of the set."""
     scalars: tuple[Descriptor, ...]
+    """The scalars; free parameters are descriptors that read them."""
     places: Int[np.ndarray, " d"]
+    """Place of the parameter that each scalar is, −1 for descriptors."""
 
     def __call__(self, z: Lanes, p: Parameters) -> Values:
         """Values at states."""

@@ -93,24 +93,16 @@ def dissect(eset: EquilibriumSet) -> Atlas:
 
 @dataclass(frozen=True, eq=False)
 class _Work:
-    """A set that is being cut: a fabric whose cells are numbered by chart instead of index.
-
-    Parameters
-    ----------
-    excerpt
-        The set that was given, all of it.
-    fabric
-        Its cells, cut; ``fabric.cell_index`` is the number of their chart.
-    origin
-        Stratum of each chart.
-    cusps
-        Vertices at cusps.
-    """
+    """A set that is being cut: a fabric whose cells are numbered by chart instead of index."""
 
     excerpt: Excerpt
+    """The set that was given, all of it."""
     fabric: Fabric
+    """Its cells, cut; ``fabric.cell_index`` is the number of their chart."""
     origin: Int[np.ndarray, " charts"]
+    """Stratum of each chart."""
     cusps: tuple[int, ...] = ()
+    """Vertices at cusps."""
 
     @classmethod
     def of(cls, eset: EquilibriumSet) -> "_Work":

@@ -88,24 +88,16 @@ class Found:
 
 @dataclass(frozen=True, eq=False)
 class Cells:
-    """Some cells of a set in the space of coordinates.
-
-    Parameters
-    ----------
-    eset
-        The set.
-    coordinates
-        The coordinates.
-    numbers
-        Which of its cells.
-    cut
-        Vertices along which the set itself was cut off.
-    """
+    """Some cells of a set in the space of coordinates."""
 
     eset: EquilibriumSet
+    """The set."""
     coordinates: Coordinates
+    """The coordinates."""
     numbers: Int[np.ndarray, " own"]
+    """Which of its cells."""
     cut: VertexFlags | None = None
+    """Vertices along which the set itself was cut off."""
 
     @cached_property
     def values(self) -> Float[np.ndarray, "V d"]:

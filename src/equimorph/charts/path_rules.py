@@ -54,26 +54,18 @@ AT_END = 1e-7
 
 @dataclass(frozen=True, eq=False)
 class Unloaded:
-    """Natural states over the other free parameters of a set.
-
-    Parameters
-    ----------
-    structure
-        The structure.
-    load, low
-        Place of the load, and its value in natural states.
-    sheet
-        Natural states over a grid, if there are two other parameters; else the structure computes
-        each of them.
-    constraints
-        What natural states must obey.
-    """
+    """Natural states over the other free parameters of a set."""
 
     structure: Structure
+    """The structure."""
     load: int
     low: float
+    """Place of the load, and its value in natural states."""
     sheet: NaturalSheet | None
+    """Natural states over a grid, if there are two other parameters; else the structure computes
+    each of them."""
     constraints: tuple[Constraint, ...]
+    """What natural states must obey."""
 
     @classmethod
     def of(cls, eset: EquilibriumSet, parameter: str) -> "Unloaded":

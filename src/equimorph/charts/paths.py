@@ -172,21 +172,14 @@ def _charts_of(eset: EquilibriumSet, chart: CellNumbers, way: Way) -> Int[np.nda
 
 @dataclass(frozen=True, eq=False)
 class Ground:
-    """Triangles over the plane, with tables for whoever walks over them.
-
-    Parameters
-    ----------
-    corners
-        Vertices of the triangles.
-    places
-        Places of all vertices in the plane.
-    whole
-        How the triangles hang together.
-    """
+    """Triangles over the plane, with tables for whoever walks over them."""
 
     corners: Int[np.ndarray, "C 3"]
+    """Vertices of the triangles."""
     places: Float[np.ndarray, "V 2"]
+    """Places of all vertices in the plane."""
     whole: Adjacency
+    """How the triangles hang together."""
 
     @cached_property
     def beyond(self) -> list[int]:
@@ -219,18 +212,12 @@ Ray = tuple[float, float, float, float]
 
 @dataclass(frozen=True, eq=False)
 class Walker:
-    """Goes straight on over triangles.
-
-    Parameters
-    ----------
-    ground
-        The triangles.
-    allowed
-        Those that may be entered.
-    """
+    """Goes straight on over triangles."""
 
     ground: Ground
+    """The triangles."""
     allowed: CellFlags
+    """Those that may be entered."""
 
     @cached_property
     def _open(self) -> list[bool]:

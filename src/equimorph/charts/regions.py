@@ -38,24 +38,17 @@ ON_FRAME = 1e-9
 
 @dataclass(frozen=True)
 class Regions:
-    """Regions of constant count, as nested levels.
-
-    Attributes
-    ----------
-    levels
-        For k = 1, 2, …: closed loops, counter-clockwise around and clockwise inside the set of
-        parameters with at least k equilibria; fill them with the non-zero rule.
-    places, edges
-        Where edges end, and which of the places are the ends of each.
-    jump, left
-        Count on the left of each edge less that on its right, and the count on its left.
-    """
+    """Regions of constant count, as nested levels."""
 
     levels: tuple[tuple[Float[np.ndarray, "_ 2"], ...], ...]
+    """For k = 1, 2, …: closed loops, counter-clockwise around and clockwise inside the set of
+    parameters with at least k equilibria; fill them with the non-zero rule."""
     places: Float[np.ndarray, "places 2"]
     edges: Int[np.ndarray, "edges 2"]
+    """Where edges end, and which of the places are the ends of each."""
     jump: Int[np.ndarray, " edges"]
     left: Int[np.ndarray, " edges"]
+    """Count on the left of each edge less that on its right, and the count on its left."""
 
     @property
     def ends(self) -> Float[np.ndarray, "edges 2 2"]:

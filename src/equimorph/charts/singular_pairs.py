@@ -78,22 +78,15 @@ class _Bend(Columns):
 
 @dataclass(frozen=True, eq=False)
 class _Nearly:
-    """Nearly singular states of coordinates.
-
-    Parameters
-    ----------
-    coordinates, ranges
-        The coordinates, and their ranges over the set.
-    states
-        The states.
-    rows
-        Planes near the tangent spaces there.
-    """
+    """Nearly singular states of coordinates."""
 
     coordinates: Coordinates
     ranges: Place
+    """The coordinates, and their ranges over the set."""
     states: States
+    """The states."""
     rows: Rows
+    """Planes near the tangent spaces there."""
 
     @cached_property
     def frames(self) -> Frames:
@@ -153,17 +146,12 @@ class SingularPairs:
     """Search for pairs of states beside the nearly singular states of some coordinates.
 
     These states are computed near the points that are asked for, and kept.
-
-    Parameters
-    ----------
-    cells
-        Cells of the chart.
-    vertices
-        Vertices of the set beside which its coordinates fold.
     """
 
     cells: Cells
+    """Cells of the chart."""
     vertices: Numbers
+    """Vertices of the set beside which its coordinates fold."""
 
     @property
     def coordinates(self) -> Coordinates:

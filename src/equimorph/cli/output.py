@@ -36,21 +36,14 @@ FORM = "%(asctime)s %(name)s: %(message)s"
 
 @dataclass(frozen=True)
 class Output:
-    """How much a command says.
-
-    Parameters
-    ----------
-    as_json
-        Whether the answers on stdout are data for programs instead of text.
-    quiet
-        Whether nothing but data and mistakes is shown.
-    verbose
-        Whether stages are logged on stderr, instead of bars.
-    """
+    """How much a command says."""
 
     as_json: bool = False
+    """Whether the answers on stdout are data for programs instead of text."""
     quiet: bool = False
+    """Whether nothing but data and mistakes is shown."""
     verbose: bool = False
+    """Whether stages are logged on stderr, instead of bars."""
 
     def show(self, text: RenderableType) -> None:
         """Write text for people on stdout, in rich's markup."""

@@ -93,19 +93,13 @@ CLOSE = 0.05
 
 @dataclass(frozen=True)
 class Measurement:
-    """Values of descriptors with their standard errors.
-
-    Parameters
-    ----------
-    descriptors
-        What is measured.
-    values, errors
-        Value and standard error of each.
-    """
+    """Values of descriptors with their standard errors."""
 
     descriptors: tuple[Descriptor, ...]
+    """What is measured."""
     values: Values
     errors: Values
+    """Value and standard error of each."""
 
     @classmethod
     def of(
@@ -128,24 +122,16 @@ class Measurement:
 
 @dataclass(frozen=True)
 class Estimate:
-    """State and loads that fit a measurement and a prior best.
-
-    Parameters
-    ----------
-    state
-        The state.
-    covariance
-        Posterior covariance of the loads (k, k).
-    misfit
-        χ²: squared residuals of measurement and prior.
-    chance
-        Probability of a misfit as large as that.
-    """
+    """State and loads that fit a measurement and a prior best."""
 
     state: State
+    """The state."""
     covariance: Covariance
+    """Posterior covariance of the loads (k, k)."""
     misfit: float
+    """χ²: squared residuals of measurement and prior."""
     chance: float
+    """Probability of a misfit as large as that."""
 
 
 def fit_loads(prior: State, at: Places, covariance: Covariance, measured: Measurement) -> Estimate:

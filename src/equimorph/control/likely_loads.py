@@ -27,21 +27,14 @@ def positions(structure: Structure, names: Iterable[str]) -> Places:
 
 @dataclass(frozen=True)
 class Bundles:
-    """Places of the actuators under each of several loads.
-
-    Parameters
-    ----------
-    states
-        The states, place by place; those under the estimated loads first.
-    safe
-        Whether a place is safe under all loads.
-    loads
-        Number of loads.
-    """
+    """Places of the actuators under each of several loads."""
 
     states: States
+    """The states, place by place; those under the estimated loads first."""
     safe: Flags
+    """Whether a place is safe under all loads."""
     loads: int
+    """Number of loads."""
 
     def __len__(self) -> int:
         """Return the number of places."""
@@ -70,24 +63,16 @@ class Bundles:
 
 @dataclass(frozen=True)
 class LikelyLoads:
-    """Loads that a structure has to bear, and what it has to keep under all of them.
-
-    Parameters
-    ----------
-    at
-        Where the loads stand among the parameters.
-    values
-        The loads: the estimated ones first, those after jumps last.
-    usual
-        Number of loads without those after jumps.
-    demands
-        Margin and constraints.
-    """
+    """Loads that a structure has to bear, and what it has to keep under all of them."""
 
     at: Places
+    """Where the loads stand among the parameters."""
     values: Float[np.ndarray, "m k"]
+    """The loads: the estimated ones first, those after jumps last."""
     usual: int
+    """Number of loads without those after jumps."""
     demands: Demands
+    """Margin and constraints."""
 
     @classmethod
     def around(

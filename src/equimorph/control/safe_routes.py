@@ -134,21 +134,14 @@ def _straighten(path: Bundles, likely: LikelyLoads) -> States:
 
 @dataclass(frozen=True)
 class _Places:
-    """The network of a set, with one place for vertices that are linked and close to each other.
-
-    Parameters
-    ----------
-    vertices
-        Stable vertices, one for each place.
-    around
-        The place of each vertex, −1 for unstable ones.
-    pairs
-        Places that are linked.
-    """
+    """The network of a set, with one place for vertices that are linked and close to each other."""
 
     vertices: Int[np.ndarray, " places"]
+    """Stable vertices, one for each place."""
     around: Int[np.ndarray, " vertices"]
+    """The place of each vertex, −1 for unstable ones."""
     pairs: Pairs
+    """Places that are linked."""
 
     @classmethod
     def within(cls, eset: EquilibriumSet, width: float) -> "_Places":

@@ -19,24 +19,16 @@ from equimorph.tolerances import SAME_TO_ROUNDING
 
 @dataclass(frozen=True)
 class MovingTarget:
-    """Targets by the legs of a motion, as `track` followed them at nominal loads.
-
-    Parameters
-    ----------
-    descriptors
-        What has targets.
-    at
-        Legs that are done.
-    values
-        Targets there.
-    actuators
-        Places of the actuators.
-    """
+    """Targets by the legs of a motion, as `track` followed them at nominal loads."""
 
     descriptors: tuple[Descriptor, ...]
+    """What has targets."""
     at: Values
+    """Legs that are done."""
     values: Float[np.ndarray, "n m"]
+    """Targets there."""
     actuators: Places
+    """Places of the actuators."""
 
     @classmethod
     def of(cls, followed: Tracking, actuators: Places) -> "MovingTarget":
@@ -83,21 +75,14 @@ class Step:
 
 @dataclass(frozen=True)
 class Strides:
-    """Moves of the actuators in a step.
-
-    Parameters
-    ----------
-    box
-        Limits of the actuators.
-    actuators
-        Where these stand among the parameters.
-    longest
-        Longest move, in their scales.
-    """
+    """Moves of the actuators in a step."""
 
     box: Box
+    """Limits of the actuators."""
     actuators: Places
+    """Where these stand among the parameters."""
     longest: float
+    """Longest move, in their scales."""
 
     def begin(
         self, state: State, there: Values | None, likely: LikelyLoads

@@ -208,21 +208,15 @@ def fold_time(
 
 @dataclass(frozen=True)
 class FoldDelay:
-    """The normal form of a fold along a motion.
-
-    Attributes
-    ----------
-    inertia, resistance, drive, curvature
-        m, c, a, b.
-    reach
-        Largest displacement of a point for x = 1.
-    """
+    """The normal form of a fold along a motion."""
 
     inertia: float
     resistance: float
     drive: float
     curvature: float
+    """m, c, a, b."""
     reach: float
+    """Largest displacement of a point for x = 1."""
 
     def lateness(self, departure: float) -> float:
         """Time after the fold at which a point has moved by `departure` from where the fold is.

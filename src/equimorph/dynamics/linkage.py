@@ -15,28 +15,19 @@ from equimorph.dynamics.mechanism import LIGHT, Mechanism, Pulls, Settings, Vect
 
 @dataclass(frozen=True, eq=False)
 class Supports:
-    """How the nodes are held, along two axes each and in their turn.
-
-    Attributes
-    ----------
-    axes
-        Unit vectors of the two axes of each node.
-    stiffness
-        Of the supports along these: ∞ where held, 0 where free.
-    places
-        Where they hold the nodes, as tables of the settings.
-    turning, turns
-        The same for the turns of the nodes.
-    rigid
-        Which nodes turn with a member.
-    """
+    """How the nodes are held, along two axes each and in their turn."""
 
     axes: Float[np.ndarray, "nodes 2 2"]
+    """Unit vectors of the two axes of each node."""
     stiffness: Float[np.ndarray, "nodes 2"]
+    """Of the supports along these: ∞ where held, 0 where free."""
     places: Float[np.ndarray, "nodes 2 settings"]
+    """Where they hold the nodes, as tables of the settings."""
     turning: Float[np.ndarray, " nodes"]
     turns: Float[np.ndarray, "nodes settings"]
+    """The same for the turns of the nodes."""
     rigid: Bool[np.ndarray, " nodes"]
+    """Which nodes turn with a member."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,46 +48,32 @@ class Linkage(Mechanism):
     member; their strains. ``L = ½ vᵀKv − v·s − Σ (P + λ)·l (1 + ε) t(θ) + …`` with the multipliers
     λ of the closure of each member, ``x_end − x_start − Σ l (1 + ε) t = 0``, and the dead forces P
     beyond each link. A multiplier is the force on the far end of a member, x and y in their turn.
-
-    Attributes
-    ----------
-    supports
-        Of the nodes.
-    ends
-        Nodes at start and end of each member.
-    lengths, masses
-        Of the links of each member.
-    bends
-        Elastic joints between links, and between links and nodes.
-    axial
-        Axial stiffness EA of each link; ∞ where it does not stretch.
-    strains
-        Strains at rest, as tables of the settings.
-    forces
-        Dead forces on the joints of each member.
-    couples
-        Couples on all entries.
-    node_forces
-        Dead forces on the nodes.
-    pressure
-        Force per length towards the left of each member.
-    poles
-        For each setting that is a pressure on several members, the nodes whose x and whose y is
-        that of the place about which their area counts; None: the start of the first member.
     """
 
     supports: Supports
+    """Of the nodes."""
     ends: Int[np.ndarray, "members 2"]
+    """Nodes at start and end of each member."""
     lengths: Float[np.ndarray, "members links"]
     masses: Float[np.ndarray, "members links"]
+    """Of the links of each member."""
     bends: Bends
+    """Elastic joints between links, and between links and nodes."""
     axial: Float[np.ndarray, "members links"]
+    """Axial stiffness EA of each link; ∞ where it does not stretch."""
     strains: Float[np.ndarray, "members links settings"]
+    """Strains at rest, as tables of the settings."""
     forces: Float[np.ndarray, "members joints 2 settings"]
+    """Dead forces on the joints of each member."""
     couples: Float[np.ndarray, "entries settings"]
+    """Couples on all entries."""
     node_forces: Float[np.ndarray, "nodes 2 settings"]
+    """Dead forces on the nodes."""
     pressure: Float[np.ndarray, "members settings"]
+    """Force per length towards the left of each member."""
     poles: Int[np.ndarray, "settings 2"] | None = None
+    """For each setting that is a pressure on several members, the nodes whose x and whose y is that
+    of the place about which their area counts; None: the start of the first member."""
 
     # --- numbering ------------------------------------------------------------------------------
 

@@ -56,31 +56,22 @@ class SpatialChain(Mechanism):
     anchor as of the first one, without angles where it is a ball joint; none where the end is free.
     They are the joints of the simulation, in the same order. Closures: place of the chain's end
     minus that of the anchor, and, where rotations are prescribed, three products of their axes.
-
-    Attributes
-    ----------
-    way
-        1 if the first link is at end A, −1 if it is at end B.
-    orders
-        Axes of the cross-section, 0 to 2 for t, n, b, about which each joint turns, one after the
-        other. With alternating orders the chain is accurate to second order.
-    slides
-        Axes along which links give.
-    far
-        Entries of the other anchor: 0, 3 or 6.
-    springs
-        Stiffness of each entry, and where it is at rest without loads: ∞ and its value where it is
-        prescribed, 0 where it is free.
-    forces
-        Dead forces on the joints between links, from the first anchor on.
     """
 
     way: int
+    """1 if the first link is at end A, −1 if it is at end B."""
     orders: Int[np.ndarray, "joints 3"]
+    """Axes of the cross-section, 0 to 2 for t, n, b, about which each joint turns, one after the
+    other. With alternating orders the chain is accurate to second order."""
     slides: tuple[int, ...]
+    """Axes along which links give."""
     far: int
+    """Entries of the other anchor: 0, 3 or 6."""
     springs: Float[np.ndarray, "entries 2 settings"]
+    """Stiffness of each entry, and where it is at rest without loads: ∞ and its value where it is
+    prescribed, 0 where it is free."""
     forces: Float[np.ndarray, "nodes 3 settings"]
+    """Dead forces on the joints between links, from the first anchor on."""
 
     # --- numbering ------------------------------------------------------------------------------
 

@@ -15,29 +15,20 @@ WORLD = -1
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """One body: a link, or a node that moves.
-
-    Attributes
-    ----------
-    parent
-        Number of the body that carries it; `WORLD` if none.
-    node, link
-        Its node, and the number of its link among all links; −1 if it is not one.
-    base
-        Node held in the world on which it stands; −1 where its parent carries it, and where it
-        floats.
-    reversed
-        Whether a link is built from its end to its start.
-    at_start
-        Whether its parent, a link that floats, carries it at its start.
-    """
+    """One body: a link, or a node that moves."""
 
     parent: int
+    """Number of the body that carries it; `WORLD` if none."""
     node: int = -1
     link: int = -1
+    """Its node, and the number of its link among all links; −1 if it is not one."""
     base: int = -1
+    """Node held in the world on which it stands; −1 where its parent carries it, and where it
+    floats."""
     reversed: bool = False
+    """Whether a link is built from its end to its start."""
     at_start: bool = False
+    """Whether its parent, a link that floats, carries it at its start."""
 
     @property
     def floats(self) -> bool:
@@ -53,16 +44,12 @@ class Tree:
     other end is at a node that has its place already, the loop is closed there. Members that both
     ends hold in the world float, carried by the link in their middle and closed at both ends:
     matrices of two branches are cheaper to factorise than those of one chain.
-
-    Attributes
-    ----------
-    closed
-        (Body at the member's far end, node) of each loop.
     """
 
     linkage: Linkage
     bodies: tuple[Body, ...]
     closed: tuple[tuple[int, int], ...]
+    """(Body at the member's far end, node) of each loop."""
 
     @cached_property
     def entries(self) -> Int[np.ndarray, " bodies"]:

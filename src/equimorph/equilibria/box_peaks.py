@@ -77,22 +77,17 @@ class BoxPeaks:
     on an edge, by Newton's method and steps along the axes, unless tangents show that it stays
     below another one. Only peaks between lattice points that leave no trace in values and slopes
     are overlooked.
-
-    Parameters
-    ----------
-    places, sizes
-        Numbers of the parameters, and half widths of the box.
-    finer
-        Factor on the number of lattice intervals; with 0 there are only the middle and the corners,
-        and no peaks are searched for.
     """
 
     structure: Structure
     descriptor: Descriptor
     places: Int[np.ndarray, " k"]
     sizes: Float[np.ndarray, " k"]
+    """Numbers of the parameters, and half widths of the box."""
     sign: float
     finer: int = 1
+    """Factor on the number of lattice intervals; with 0 there are only the middle and the corners,
+    and no peaks are searched for."""
 
     @property
     def levels(self) -> int:

@@ -21,23 +21,17 @@ class Critical:
     With ``[F_z b; bᵀ 0] [v; g] = [0; 1]`` the matrix F_z is singular exactly where g = 0, and then
     v is its null vector with b·v = 1 [Govaerts2000]_. All test functions are smooth in (z, p) as
     long as no second eigenvalue vanishes.
-
-    Parameters
-    ----------
-    structure, z, p, b
-        The structure, the points, and their borders.
-    system
-        F_z at the points, if it is at hand.
-    null
-        (v, g), if they are known.
     """
 
     structure: Equations
     z: Lanes
     p: Parameters
     b: Lanes
+    """The structure, the points, and their borders."""
     system: LinearSystem | None = None
+    """F_z at the points, if it is at hand."""
     null: Float[np.ndarray, "lanes extended"] | None = None
+    """(v, g), if they are known."""
 
     @cached_property
     def _bordered(self) -> Float[np.ndarray, "lanes extended"]:

@@ -36,27 +36,18 @@ RELAXATIONS = 4
 
 @dataclass(frozen=True)
 class Descents:
-    """Where flows from states ended: in the first row all along the softest mode, then against it.
-
-    Parameters
-    ----------
-    code
-        `Ending` of each flow.
-    z
-        Where it ended; the state itself where nothing moves.
-    soft
-        Softest modes of the states.
-    flow
-        The way of the flows that left, each in a separate lane.
-    lane
-        Lane in `flow` of each descent; −1 where nothing left.
-    """
+    """Where flows from states ended: in the first row along the softest mode, then against it."""
 
     code: Int[np.ndarray, "2 lanes"]
+    """`Ending` of each flow."""
     z: Float[np.ndarray, "2 lanes size"]
+    """Where it ended; the state itself where nothing moves."""
     soft: SoftModes
+    """Softest modes of the states."""
     flow: Flow
+    """The way of the flows that left, each in a separate lane."""
     lane: Int[np.ndarray, "2 lanes"]
+    """Lane in `flow` of each descent; −1 where nothing left."""
 
 
 def descend(

@@ -53,28 +53,19 @@ class _Walk(Columns):
 
 @dataclass(frozen=True)
 class FirstStable:
-    """The first stable state at a given load on paths from unloaded states.
-
-    Attributes
-    ----------
-    structure
-        The structure.
-    load, low
-        Place of the parameter along which paths run, and its value where they start.
-    bound
-        Largest load, of either sign, up to which paths are followed.
-    within
-        Constraints that end paths.
-    options
-        Step control; paths must go through folds and branch points.
-    """
+    """The first stable state at a given load on paths from unloaded states."""
 
     structure: Structure
+    """The structure."""
     load: int
     low: float
+    """Place of the parameter along which paths run, and its value where they start."""
     bound: float
+    """Largest load, of either sign, up to which paths are followed."""
     within: tuple[Constraint, ...]
+    """Constraints that end paths."""
     options: TraceOptions
+    """Step control; paths must go through folds and branch points."""
 
     def __call__(
         self,

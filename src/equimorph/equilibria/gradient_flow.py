@@ -45,24 +45,16 @@ REASONS = {
 
 @dataclass(frozen=True)
 class Pace:
-    """How long the steps of a flow may be, and where it ends; no length is absolute.
-
-    Parameters
-    ----------
-    change
-        Largest change of the velocity in one step, relative to the larger one of both.
-    near
-        Newton step to a stable state, relative to the way so far, from which on it is solved for.
-    steps
-        Most steps of one flow.
-    longest
-        Length of a step, relative to the way so far.
-    """
+    """How long the steps of a flow may be, and where it ends; no length is absolute."""
 
     change: float
+    """Largest change of the velocity in one step, relative to the larger one of both."""
     near: float
+    """Newton step to a stable state, relative to the way so far, from which on it is solved for."""
     steps: int
+    """Most steps of one flow."""
     longest: float = 0.5
+    """Length of a step, relative to the way so far."""
 
 
 FAITHFUL = Pace(change=0.4, near=1e-2, steps=3000)

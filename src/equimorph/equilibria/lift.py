@@ -37,30 +37,20 @@ __all__ = ["Event", "Lifts", "Path", "check_start", "lift", "way_points"]
 
 @dataclass(frozen=True, eq=False)
 class Marks:
-    """Events or points on the way of many lifts, sorted by lane and then along each.
-
-    Parameters
-    ----------
-    lane
-        Number of the state that was lifted.
-    states
-        Exact states.
-    at
-        Number of the leg plus the fraction of it.
-    kind
-        A kind of `Event`; "" for a regular point.
-    index
-        Negative eigenvalues of the constrained Hessian; just before an event.
-    criticality
-        Criticality of branch points; "" otherwise.
-    """
+    """Events or points on the way of many lifts, sorted by lane and then along each."""
 
     lane: Int[np.ndarray, " marks"]
+    """Number of the state that was lifted."""
     states: States
+    """Exact states."""
     at: Float[np.ndarray, " marks"]
+    """Number of the leg plus the fraction of it."""
     kind: Shaped[np.ndarray, " marks"]
+    """A kind of `Event`; "" for a regular point."""
     index: Int[np.ndarray, " marks"]
+    """Negative eigenvalues of the constrained Hessian; just before an event."""
     criticality: Shaped[np.ndarray, " marks"]
+    """Criticality of branch points; "" otherwise."""
 
     def __len__(self) -> int:
         """How many."""

@@ -211,21 +211,15 @@ class Standing(StrEnum):
 
 @dataclass(frozen=True)
 class Argument:
-    """One argument for completeness.
-
-    Parameters
-    ----------
-    name
-        "descents", "graph of minima", "sum of indices", or "pushes" where these were left out.
-    standing
-        Whether it holds, is left open, or does not apply.
-    detail
-        What was found, or why it does not apply; one line.
-    """
+    """One argument for completeness."""
 
     name: str
+    """One of "descents", "graph of minima", "sum of indices", or "pushes" where these were left
+    out."""
     standing: Standing
+    """Whether it holds, is left open, or does not apply."""
     detail: str
+    """What was found, or why it does not apply; one line."""
 
     def __str__(self) -> str:
         """One line."""

@@ -20,26 +20,18 @@ TRIES = 3
 
 @dataclass(frozen=True)
 class NaturalSheet:
-    """Natural states over the vertices of a grid, and over settings between them.
-
-    Attributes
-    ----------
-    structure
-        The structure.
-    base
-        All parameters, unloaded; those of the grid are replaced.
-    axes, places
-        Grid lines and the places of their parameters.
-    z, found
-        States over the vertices (row by row), and whether there is one.
-    """
+    """Natural states over the vertices of a grid, and over settings between them."""
 
     structure: Structure
+    """The structure."""
     base: Float[np.ndarray, " parameters"]
+    """All parameters, unloaded; those of the grid are replaced."""
     axes: tuple[Float[np.ndarray, " _"], Float[np.ndarray, " _"]]
     places: Int[np.ndarray, " 2"]
+    """Grid lines and the places of their parameters."""
     z: Float[np.ndarray, "vertices size"]
     found: Bool[np.ndarray, " vertices"]
+    """States over the vertices (row by row), and whether there is one."""
 
     def without_states(self) -> "NaturalSheet":
         """Return the sheet without its states, for those who are given what they need of it."""

@@ -24,39 +24,26 @@ determinant is `DEPENDENT` then."""
 
 @dataclass(frozen=True)
 class Tangents(Columns):
-    """Coordinates along the set: its tangent spaces, found on the way. Regular at folds, too.
-
-    Parameters
-    ----------
-    unfolded
-        Solve F + βb = 0 with one more unknown β, b near the null vector: regular at branch points
-        and where sheets cross, too. There β is zero.
-    border
-        b, if it is given: then it is kept.
-    """
+    """Coordinates along the set: its tangent spaces, found on the way. Regular at folds, too."""
 
     unfolded: bool = False
+    """Solve F + βb = 0 with one more unknown β, b near the null vector: regular at branch points
+    and where sheets cross, too. There β is zero."""
     border: Lanes | None = None
+    """b, if it is given: then it is kept."""
 
 
 @dataclass(frozen=True)
 class Planes(Columns):
-    """Coordinates along the set: projections to given planes that are near its tangent spaces.
-
-    Parameters
-    ----------
-    by_z, by_p
-        k rows for each lane, whose products with (dz, dp) are the coordinates.
-    by_beta
-        Their products with β, if F + βb = 0 is solved with this unknown, too.
-    border
-        b, if it is given: then it is kept.
-    """
+    """Coordinates along the set: projections to given planes that are near its tangent spaces."""
 
     by_z: Float[np.ndarray, "lanes k size"]
     by_p: Float[np.ndarray, "lanes k parameters"]
+    """k rows for each lane, whose products with (dz, dp) are the coordinates."""
     by_beta: Float[np.ndarray, "lanes k"] | None = None
+    """Their products with β, if F + βb = 0 is solved with this unknown, too."""
     border: Lanes | None = None
+    """b, if it is given: then it is kept."""
 
     @property
     def unfolded(self) -> bool:

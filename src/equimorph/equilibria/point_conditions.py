@@ -81,14 +81,10 @@ class Crossing(Columns):
     is ``r(ξ, π) = 0`` in the amplitude ξ of the null vector and steps π along `directions`. The
     point must be sought with the border as one more unknown (`unfolded`). There is one scalar more
     than directions; all vanish together, so that least squares converge quadratically.
-
-    Parameters
-    ----------
-    directions
-        Changes of the parameters along which the set branches.
     """
 
     directions: Directions
+    """Changes of the parameters along which the set branches."""
     critical = True
 
     def linear(self, at: Critical, move: Move) -> Linear:
@@ -111,20 +107,14 @@ class Crossing(Columns):
 
 @dataclass(frozen=True)
 class Plane(Columns):
-    """Points in planes through given points: parameters held, arclength, normal spaces of groups.
-
-    Parameters
-    ----------
-    z, p
-        A point of the plane of each lane.
-    by_z, by_p
-        Normals: ``by_z·(z' − z) + by_p·(p' − p) = 0`` for each of m rows.
-    """
+    """Points in planes through given points: parameters held, arclength, normals of groups."""
 
     z: Lanes
     p: Parameters
+    """A point of the plane of each lane."""
     by_z: Float[np.ndarray, "lanes m size"]
     by_p: Float[np.ndarray, "lanes m parameters"]
+    """Normals: ``by_z·(z' − z) + by_p·(p' − p) = 0`` for each of m rows."""
     critical = False
 
     def linear(self, at: Critical, move: Move) -> Linear:
@@ -138,28 +128,19 @@ class Plane(Columns):
 
 @dataclass(frozen=True)
 class Values(Columns):
-    """Scalars of states take given values: descriptors, targets, active constraints.
-
-    Parameters
-    ----------
-    functions
-        The m scalars.
-    targets
-        Their values for each lane.
-    difference
-        Step of differences, in the metric.
-    one_sided
-        Whether differences are taken towards one side only: cheaper, and less exact.
-    reach
-        Steps onto the set longer than this, in the metric, are not looked ahead: far from the set
-        the scalars may have no meaning.
-    """
+    """Scalars of states take given values: descriptors, targets, active constraints."""
 
     functions: tuple[Evaluate, ...]
+    """The m scalars."""
     targets: Float[np.ndarray, "lanes m"]
+    """Their values for each lane."""
     difference: float = VALUE_DIFFERENCE
+    """Step of differences, in the metric."""
     one_sided: bool = False
+    """Whether differences are taken towards one side only: cheaper, and less exact."""
     reach: float = np.inf
+    """Steps onto the set longer than this, in the metric, are not looked ahead: far from the set
+    the scalars may have no meaning."""
     critical = False
 
     def linear(self, at: Critical, move: Move) -> Linear:

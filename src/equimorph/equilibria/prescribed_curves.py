@@ -36,20 +36,14 @@ class Pieces:
     """Chebyshev series on each piece of [0, 1], for one curve or one for each lane.
 
     Beyond t = 0 and 1 curves go on straight.
-
-    Parameters
-    ----------
-    breaks
-        Ends of the pieces, from 0 to 1.
-    tables
-        Coefficients of the values and of their first and second derivatives.
-    which
-        Number of the curve of each lane.
     """
 
     breaks: Float[np.ndarray, " ends"]
+    """Ends of the pieces, from 0 to 1."""
     tables: tuple[Table, Table, Table]
+    """Coefficients of the values and of their first and second derivatives."""
     which: Numbers
+    """Number of the curve of each lane."""
 
     def take(self, lanes: Some) -> "Pieces":
         """Return a selection of the lanes."""
@@ -184,22 +178,16 @@ class TrackedCurve:
 
     Unknowns (u, a, λ): those of the structure with the free parameters a between u and λ.
     Descriptors are differentiated along the set, by central differences.
-
-    Parameters
-    ----------
-    prescribed
-        All parameters (those of the free ones do not count) and then S*, as functions of t.
-    free
-        Places of the unknown parameters, as many as descriptors.
-    weight
-        Scaled length of what is prescribed.
     """
 
     structure: Structure
     prescribed: Pieces
+    """All parameters (those of the free ones do not count) and then S*, as functions of t."""
     free: Int[np.ndarray, " k"]
+    """Places of the unknown parameters, as many as descriptors."""
     descriptors: tuple[Descriptor, ...]
     weight: Values
+    """Scaled length of what is prescribed."""
 
     @cached_property
     def metric(self) -> TrackedMetric:

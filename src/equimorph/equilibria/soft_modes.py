@@ -35,36 +35,25 @@ how often it becomes known better."""
 
 @dataclass(frozen=True)
 class SoftModes(Columns):
-    """Smallest eigenvalue of the constrained Hessian in the metric, and its mode, per lane.
-
-    Parameters
-    ----------
-    eigenvalue
-        Energy over the metric's unit squared.
-    mode
-        Changes of the unknowns, of length one; a generic vector fixes the sign.
-    stiffness
-        About the size of the other eigenvalues.
-    length
-        Distance along the mode, in the metric, over which the eigenvalue changes by its own size:
-        about the distance of a saddle from its neighbours. At critical states the distance over
-        which the third derivative changes so.
-    own_length
-        The former at critical states, too: about the distance to their neighbours.
-    rate
-        Size of the eigenvalue at this distance: its inverse is the scale of time.
-    critical
-        Whether the state is a fold or branch point: it is not unstable, or the next state would be
-        the same state.
-    """
+    """Smallest eigenvalue of the constrained Hessian in the metric, and its mode, per lane."""
 
     eigenvalue: Values
+    """Energy over the metric's unit squared."""
     mode: Modes
+    """Changes of the unknowns, of length one; a generic vector fixes the sign."""
     stiffness: Values
+    """About the size of the other eigenvalues."""
     length: Values
+    """Distance along the mode, in the metric, over which the eigenvalue changes by its own size:
+    about the distance of a saddle from its neighbours. At critical states the distance over which
+    the third derivative changes so."""
     own_length: Values
+    """The former at critical states, too: about the distance to their neighbours."""
     rate: Values
+    """Size of the eigenvalue at this distance: its inverse is the scale of time."""
     critical: Flags
+    """Whether the state is a fold or branch point: it is not unstable, or the next state would be
+    the same state."""
 
 
 def soft_modes(structure: Structure, z: Lanes, p: Parameters) -> SoftModes:

@@ -117,35 +117,24 @@ class Scales:
 
 @dataclass(frozen=True, eq=False)
 class Gallery:
-    """Pictures of all states, packed.
-
-    Parameters
-    ----------
-    layout
-        Parts of a picture in the order of its numbers, as plain data for the page.
-    space
-        2 or 3: coordinates of a point.
-    size
-        Size of the structure in its unit of length.
-    mean, modes
-        Numbers of the mean picture, and of the modes; the largest number of a mode is 1.
-    low, step
-        Lowest coefficient of each mode, and the value of one step.
-    coefficients
-        Steps above the lowest.
-    error
-        Largest error of a number of a picture without rounding, as a share of the size.
-    """
+    """Pictures of all states, packed."""
 
     layout: list[dict[str, Any]]
+    """Parts of a picture in the order of its numbers, as plain data for the page."""
     space: int
+    """2 or 3: coordinates of a point."""
     size: float
+    """Size of the structure in its unit of length."""
     mean: Float[np.ndarray, " numbers"]
     modes: Rows
+    """Numbers of the mean picture, and of the modes; the largest number of a mode is 1."""
     low: Float[np.ndarray, " modes"]
     step: Float[np.ndarray, " modes"]
+    """Lowest coefficient of each mode, and the value of one step."""
     coefficients: UInt16[np.ndarray, "lanes modes"]
+    """Steps above the lowest."""
     error: float
+    """Largest error of a number of a picture without rounding, as a share of the size."""
 
 
 def gallery(states: States) -> Gallery:

@@ -29,20 +29,14 @@ class Coupling:
 
     H has ``pull (W_ij sin(θ_i − θ_j) + m_i m_j Re(q exp(i(θ_i + θ_j))))`` beside its elements and
     diagonal, with ``W_ij = ½ sign(e − f) m_i m_j`` between elements e and f.
-
-    Parameters
-    ----------
-    inside
-        W within each element; antisymmetric.
-    weights
-        m of the nodes of every element, which are added up where elements meet.
-    closed
-        Real and imaginary part of q.
     """
 
     inside: Float[np.ndarray, "elements order order"]
+    """W within each element; antisymmetric."""
     weights: Float[np.ndarray, "elements order"]
+    """m of the nodes of every element, which are added up where elements meet."""
     closed: Float[np.ndarray, "2"]
+    """Real and imaginary part of q."""
 
     @property
     def tables(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -41,27 +41,19 @@ class _Elimination:
 
 @dataclass(frozen=True, eq=False)
 class SparseLayout:
-    """Symmetric matrices of one sparsity pattern, many lanes at a time.
-
-    Parameters
-    ----------
-    rows, columns
-        Places of the entries of the lower triangle, row ≥ column, each once; the diagonal must be
-        complete. A lane's matrix is the array of its entries in this order.
-    size
-        Number of rows.
-    multipliers
-        How many rows at the end have a zero diagonal (Lagrange multipliers): they are eliminated
-        after all others, unless there are ranks.
-    ranks
-        Rows of lower rank are eliminated first.
-    """
+    """Symmetric matrices of one sparsity pattern, many lanes at a time."""
 
     rows: Int[np.ndarray, " entries"]
     columns: Int[np.ndarray, " entries"]
+    """Places of the entries of the lower triangle, row ≥ column, each once; the diagonal must be
+    complete. A lane's matrix is the array of its entries in this order."""
     size: int
+    """Number of rows."""
     multipliers: int = 0
+    """How many rows at the end have a zero diagonal (Lagrange multipliers): they are eliminated
+    after all others, unless there are ranks."""
     ranks: Int[np.ndarray, " size"] | None = None
+    """Rows of lower rank are eliminated first."""
 
     @cached_property
     def diagonal(self) -> Int[np.ndarray, " size"]:

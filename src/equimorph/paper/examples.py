@@ -11,21 +11,14 @@ from equimorph.paper.spring import spring
 
 @dataclass(frozen=True)
 class Example:
-    """A result of the article, reproduced.
-
-    Parameters
-    ----------
-    title
-        For people.
-    main
-        Draws the figures into a folder and returns the key numbers by name.
-    captions
-        Names of the figures without extension, and what stands below each.
-    """
+    """A result of the article, reproduced."""
 
     title: str
+    """For people."""
     main: Callable[[Path], dict[str, float]]
+    """Draws the figures into a folder and returns the key numbers by name."""
     captions: dict[str, str]
+    """Names of the figures without extension, and what stands below each."""
 
     @property
     def name(self) -> str:

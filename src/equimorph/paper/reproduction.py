@@ -17,41 +17,28 @@ from equimorph.study.folder import writable
 
 @dataclass(frozen=True)
 class Quoted:
-    """A number of the article.
-
-    Parameters
-    ----------
-    example, key
-        The example, and the key of ours among its numbers.
-    what, theirs
-        What is quoted, and its value; True or False where the article says yes or no.
-    note
-        One sentence where they differ by more than their last digit.
-    """
+    """A number of the article."""
 
     example: str
     key: str
+    """The example, and the key of ours among its numbers."""
     what: str
     theirs: float
+    """What is quoted, and its value; True or False where the article says yes or no."""
     note: str = ""
+    """One sentence where they differ by more than their last digit."""
 
 
 @dataclass(frozen=True)
 class QuotedTable:
-    """A table of the article, ours in brackets.
-
-    Parameters
-    ----------
-    example, caption, head
-        The example, what the table shows, and its column titles.
-    rows
-        The label of each row, and for each cell theirs and the key of ours.
-    """
+    """A table of the article, ours in brackets."""
 
     example: str
     caption: str
     head: tuple[str, ...]
+    """The example, what the table shows, and its column titles."""
     rows: tuple[tuple[str, tuple[tuple[str, str], ...]], ...]
+    """The label of each row, and for each cell theirs and the key of ours."""
 
 
 CONVENTION = (

@@ -21,19 +21,13 @@ from equimorph.structures import Structure
 
 @dataclass(frozen=True)
 class View:
-    """How coordinates become places on the screen; a parallel projection.
-
-    Attributes
-    ----------
-    linear, shift
-        Columns, rows and depths of points are ``points @ linear + shift``, all in pixels.
-    point
-        Pixels per typographic point.
-    """
+    """How coordinates become places on the screen; a parallel projection."""
 
     linear: Float[np.ndarray, "3 3"]
     shift: Float[np.ndarray, " 3"]
+    """Columns, rows and depths of points are ``points @ linear + shift``, all in pixels."""
     point: float
+    """Pixels per typographic point."""
 
     def place(self, points: Float[np.ndarray, "*n 3"]) -> Float[np.ndarray, "*n 3"]:
         """Columns, rows and depths of points."""
@@ -66,18 +60,12 @@ makes it visible: a curve runs along edges of the surface, and one visible side 
 
 @dataclass(frozen=True)
 class DepthBuffer:
-    """What is nearest to the viewer at every pixel.
-
-    Attributes
-    ----------
-    owner
-        Number of the triangle visible at the middle of each pixel, −1 for the background.
-    depth
-        Distance of that place from the viewer, infinite for the background.
-    """
+    """What is nearest to the viewer at every pixel."""
 
     owner: Int[np.ndarray, "rows columns"]
+    """Number of the triangle visible at the middle of each pixel, −1 for the background."""
     depth: Float[np.ndarray, "rows columns"]
+    """Distance of that place from the viewer, infinite for the background."""
 
     def shows(self, places: Float[np.ndarray, "points 3"], slack: float) -> Bool[np.ndarray, " _"]:
         """Whether points can be seen; those on the surface may lie `slack` behind it.
@@ -141,15 +129,10 @@ _END_ON = 0.05
 
 @dataclass(frozen=True)
 class Viewpoint:
-    """Parallel projection of space.
-
-    Parameters
-    ----------
-    upward
-        Axis that is upward in the picture: y or z.
-    """
+    """Parallel projection of space."""
 
     upward: str
+    """Axis that is upward in the picture: y or z."""
 
     @cached_property
     def frame(self) -> Float[np.ndarray, "3 3"]:

@@ -15,19 +15,13 @@ _ON_LINE = 1e-9
 
 @dataclass(frozen=True)
 class Faces:
-    """What to fill.
-
-    Attributes
-    ----------
-    triangles
-        Vertices (row by row) of the triangles of the cells that no curve enters.
-    pieces, values
-        Polygons of the other cells, and the mean values of their corners.
-    """
+    """What to fill."""
 
     triangles: Int[np.ndarray, "triangles 3"]
+    """Vertices (row by row) of the triangles of the cells that no curve enters."""
     pieces: list[Float[np.ndarray, "_ 2"]]
     values: Float[np.ndarray, " pieces"]
+    """Polygons of the other cells, and the mean values of their corners."""
 
 
 def faces(

@@ -84,30 +84,20 @@ class Mark:
 
 @dataclass(frozen=True)
 class Panel:
-    """What a figure of a map shows in addition to the values.
-
-    Attributes
-    ----------
-    looks
-        Looks of the curves by kind; those of other kinds are left out.
-    bar
-        Label of the colour bar.
-    marks
-        Settings that have a pattern, and what it means.
-    ground_label
-        What is hatched.
-    from_zero
-        Whether colours begin at zero.
-    highest
-        Value of the last colour; that of the map if there is none.
-    """
+    """What a figure of a map shows in addition to the values."""
 
     looks: Mapping[str, CurveLook]
+    """Looks of the curves by kind; those of other kinds are left out."""
     bar: str
+    """Label of the colour bar."""
     marks: tuple[Mark, ...]
+    """Settings that have a pattern, and what it means."""
     ground_label: str
+    """What is hatched."""
     from_zero: bool
+    """Whether colours begin at zero."""
     highest: float | None = None
+    """Value of the last colour; that of the map if there is none."""
 
 
 def new_map_axes(wider: float = 0.0) -> Axes:

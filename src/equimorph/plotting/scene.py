@@ -35,24 +35,17 @@ single ones err."""
 
 @dataclass(frozen=True)
 class Curve:
-    """A polyline on the surface.
-
-    Attributes
-    ----------
-    points
-        In the coordinates of the axes.
-    seen, hidden
-        Settings of the line (color, linewidth, linestyle, …) where it is seen and where the
-        surface hides it; None leaves that part out.
-    slack
-        How far behind the surface it may lie and still belong to it, as a share of the depth of
-        the scene.
-    """
+    """A polyline on the surface."""
 
     points: Float[np.ndarray, "points 3"]
+    """In the coordinates of the axes."""
     seen: Mapping[str, Any]
     hidden: Mapping[str, Any] | None = None
+    """Settings of the line (color, linewidth, linestyle, …) where it is seen and where the surface
+    hides it; None leaves that part out."""
     slack: float = 0.004
+    """How far behind the surface it may lie and still belong to it, as a share of the depth of the
+    scene."""
 
 
 class Scene(Artist):

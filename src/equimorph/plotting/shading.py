@@ -24,27 +24,18 @@ _STEEPER = 3.0
 
 @dataclass(frozen=True)
 class Paint:
-    """How a surface is painted.
-
-    Attributes
-    ----------
-    normals
-        Unit normals at the corners of the triangles, in the proportions that are drawn.
-    proportions
-        Factors from the coordinates of the axes to the proportions that are drawn.
-    colours
-        Red, green and blue of each triangle in full light.
-    spacing
-        Thin lines run over the surface where its first coordinates are multiples of these.
-    ink
-        Red, green and blue of the thin lines and of the outlines.
-    """
+    """How a surface is painted."""
 
     normals: Corners
+    """Unit normals at the corners of the triangles, in the proportions that are drawn."""
     proportions: Float[np.ndarray, " 3"]
+    """Factors from the coordinates of the axes to the proportions that are drawn."""
     colours: Float[np.ndarray, "cells 3"]
+    """Red, green and blue of each triangle in full light."""
     spacing: tuple[float, ...]
+    """Thin lines run over the surface where its first coordinates are multiples of these."""
     ink: Float[np.ndarray, " 3"]
+    """Red, green and blue of the thin lines and of the outlines."""
 
 
 def corner_normals(

@@ -68,18 +68,12 @@ class Moving:
 
 @dataclass(frozen=True, eq=False)
 class Surroundings:
-    """Shapes of states and what stands around them, in the coordinates of the axes.
-
-    Parameters
-    ----------
-    states
-        At least one, of one structure.
-    obstacles
-        Half-planes and discs that the shapes must stay clear of.
-    """
+    """Shapes of states and what stands around them, in the coordinates of the axes."""
 
     states: States
+    """At least one, of one structure."""
     obstacles: tuple[Obstacle, ...] = ()
+    """Half-planes and discs that the shapes must stay clear of."""
 
     @cached_property
     def _shapes(self) -> Float[np.ndarray, "states points space"]:

@@ -11,18 +11,12 @@ from equimorph.structures import Structure
 
 @dataclass(frozen=True)
 class Owner:
-    """The structure of all records of a file, and descriptors that only the caller has.
-
-    Parameters
-    ----------
-    structure
-        Knows its own descriptors by their names.
-    descriptors
-        Descriptors that users made of functions, by their names.
-    """
+    """The structure of all records of a file, and descriptors that only the caller has."""
 
     structure: Structure
+    """Knows its own descriptors by their names."""
     descriptors: Mapping[str, Descriptor] = field(default_factory=dict)
+    """Descriptors that users made of functions, by their names."""
 
     def descriptor(self, name: str) -> Descriptor:
         """Descriptor of a name that the structure or the user gives; other names are refused."""

@@ -38,23 +38,16 @@ RECORD, STRUCTURE, FOUND = "record", "structure", "found"
 
 @dataclass(frozen=True)
 class Layout:
-    """How one kind of record is laid out in a group.
-
-    Parameters
-    ----------
-    schema, version
-        Name in files; the version rises with each change that older releases cannot read.
-    kinds
-        Classes that are written so.
-    write, read
-        Into an empty group, and back.
-    """
+    """How one kind of record is laid out in a group."""
 
     schema: str
     version: int
+    """Name in files; the version rises with each change that older releases cannot read."""
     kinds: tuple[type, ...]
+    """Classes that are written so."""
     write: Callable[[h5py.Group, Any], None]
     read: Callable[[h5py.Group, Owner], Any]
+    """Into an empty group, and back."""
 
 
 def _write_calibration(group: h5py.Group, found: Calibration) -> None:

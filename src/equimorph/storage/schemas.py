@@ -47,27 +47,18 @@ class UnreadableError(InputError):
 
 @dataclass(frozen=True)
 class Change:
-    """How a record changed since files were first written.
-
-    Parameters
-    ----------
-    version
-        Of the schema: 1, and one more for each change that older releases cannot read.
-    schema
-        Name in files, where the class is called otherwise now.
-    renamed
-        Names of fields in older versions, with those of today.
-    added
-        Values for fields that older versions lack; defaults of the class need not be repeated.
-    removed
-        Fields of older versions that are no longer there.
-    """
+    """How a record changed since files were first written."""
 
     version: int = 1
+    """Of the schema: 1, and one more for each change that older releases cannot read."""
     schema: str | None = None
+    """Name in files, where the class is called otherwise now."""
     renamed: Mapping[str, str] = field(default_factory=dict)
+    """Names of fields in older versions, with those of today."""
     added: Mapping[str, Any] = field(default_factory=dict)
+    """Values for fields that older versions lack; defaults of the class need not be repeated."""
     removed: tuple[str, ...] = ()
+    """Fields of older versions that are no longer there."""
 
 
 CHANGES: Mapping[str, Change] = {

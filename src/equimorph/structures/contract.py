@@ -41,26 +41,19 @@ class CompiledSteps:
     Forces on the unknowns may change along these, too.
 
     Their results are those of `Structure.advance` and of the constraints.
-
-    Parameters
-    ----------
-    march
-        `marching.tick_kernels.march_of`, made with the structure's step and values of constraints.
-    search
-        `marching.search_kernels.search_of`, made with the same.
-    tables
-        What these share among lanes.
-    bounds
-        The constraints, one a row, as the structure's kernel reads them.
-    guard
-        Least ratio of the pivots of a step; below it `Structure.advance` takes the step.
     """
 
     march: Callable[..., int]
+    """`marching.tick_kernels.march_of`, made with the structure's step and values of
+    constraints."""
     search: Callable[..., int]
+    """`marching.search_kernels.search_of`, made with the same."""
     tables: tuple[tuple[np.ndarray, ...], ...]
+    """What these share among lanes."""
     bounds: Float[np.ndarray, "constraints 4"]
+    """The constraints, one a row, as the structure's kernel reads them."""
     guard: float
+    """Least ratio of the pivots of a step; below it `Structure.advance` takes the step."""
 
 
 @dataclass(frozen=True)

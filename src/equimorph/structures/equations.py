@@ -58,24 +58,17 @@ class CompiledNewton:
     """Newton's method as one loop over the kernel of a structure's step.
 
     Its steps are those of `Equations.correction` at fixed parameters, else of `Equations.advance`.
-
-    Parameters
-    ----------
-    run
-        `newton_kernels.newton_of`, made with the structure's step.
-    tables
-        What it shares among lanes.
-    guards
-        Least ratios of the pivots of a step, at fixed parameters and in planes; below them those
-        methods take the step.
-    widths
-        Entries of z and p.
     """
 
     run: Callable[..., tuple[int, int]]
+    """`newton_kernels.newton_of`, made with the structure's step."""
     tables: tuple[tuple[np.ndarray, ...], ...]
+    """What it shares among lanes."""
     guards: tuple[float, float]
+    """Least ratios of the pivots of a step, at fixed parameters and in planes; below them those
+    methods take the step."""
     widths: tuple[int, int]
+    """Entries of z and p."""
 
 
 AnyBorder = Border | None

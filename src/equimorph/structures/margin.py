@@ -154,27 +154,18 @@ def first_pairs(structure: Pencil, lanes: int) -> Pairs:
 
 @dataclass(frozen=True)
 class Softest(Columns):
-    """Rayleigh quotients of pairs of vectors.
-
-    Parameters
-    ----------
-    pairs
-        Vectors (v, μ), orthonormal in the metric; of these the first is the mode.
-    first
-        Rayleigh quotient of the first.
-    second
-        Ritz value of the second.
-    above
-        Whether no eigenvalue lies below the shift.
-    off
-        Square of the residual of the mode, in the inverse of the metric.
-    """
+    """Rayleigh quotients of pairs of vectors."""
 
     pairs: Pairs
+    """Vectors (v, μ), orthonormal in the metric; of these the first is the mode."""
     first: Values
+    """Rayleigh quotient of the first."""
     second: Values
+    """Ritz value of the second."""
     above: Flags
+    """Whether no eigenvalue lies below the shift."""
     off: Values
+    """Square of the residual of the mode, in the inverse of the metric."""
 
 
 def softest_modes(

@@ -52,38 +52,26 @@ class Steps(Protocol):
 
 @dataclass(frozen=True)
 class Limits:
-    """How long steps may be, and when a lane ends.
-
-    Parameters
-    ----------
-    iterations
-        Most steps.
-    longest
-        Length in the metric to which steps are shortened.
-    too_long
-        Length of a step at which a lane is given up: the guess was not near. One for all lanes, or
-        one each.
-    converged
-        A shorter step is the last; Newton squares what is left.
-    following
-        Estimate of the next step, from the last two, below which it is not taken.
-    contraction, free
-        Each step must be at most so much of the one before, after so many steps that need not.
-    exempt
-        Index of lanes whose steps need not contract: theirs is the sheet that is sought.
-    multipliers
-        Weight of squared multipliers in the length of steps.
-    """
+    """How long steps may be, and when a lane ends."""
 
     iterations: int = 60
+    """Most steps."""
     longest: float = 0.7
+    """Length in the metric to which steps are shortened."""
     too_long: float | Values = np.inf
+    """Length of a step at which a lane is given up: the guess was not near. One for all lanes, or
+    one each."""
     converged: float = CONVERGED
+    """A shorter step is the last; Newton squares what is left."""
     following: float = 0.0
+    """Estimate of the next step, from the last two, below which it is not taken."""
     contraction: float = np.inf
     free: int = 0
+    """Each step must be at most so much of the one before, after so many steps that need not."""
     exempt: Numbers | None = None
+    """Index of lanes whose steps need not contract: theirs is the sheet that is sought."""
     multipliers: float = 0.0
+    """Weight of squared multipliers in the length of steps."""
 
     def take(self, some: Numbers) -> "Limits":
         """Limits of some of the lanes."""
@@ -131,29 +119,20 @@ class Through:
 
 @dataclass(frozen=True)
 class Newton:
-    """Where Newton's method ended.
-
-    Parameters
-    ----------
-    z, p
-        Points; the last ones where nothing was found.
-    status
-        How lanes ended, as in `newton_kernels`.
-    size, first
-        Lengths of the last and of the first step.
-    index
-        Negative eigenvalues of the constrained Hessian where the last step began.
-    tangents
-        Tangents (dz, ds) of the curves there; none at fixed parameters.
-    """
+    """Where Newton's method ended."""
 
     z: Lanes
     p: Parameters
+    """Points; the last ones where nothing was found."""
     status: Numbers
+    """How lanes ended, as in `newton_kernels`."""
     size: Values
     first: Values
+    """Lengths of the last and of the first step."""
     index: Numbers
+    """Negative eigenvalues of the constrained Hessian where the last step began."""
     tangents: Float[np.ndarray, "lanes k bordered"]
+    """Tangents (dz, ds) of the curves there; none at fixed parameters."""
 
     @property
     def found(self) -> Flags:

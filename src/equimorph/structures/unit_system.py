@@ -36,16 +36,11 @@ Part = TypeVar("Part")
 
 @dataclass(frozen=True)
 class UnitSystem:
-    """The units of force and of length in which a structure's numbers are given and returned.
-
-    Parameters
-    ----------
-    force, length
-        Names in `UNITS`; None: numbers are in any one system, and texts are refused.
-    """
+    """The units of force and of length in which a structure's numbers are given and returned."""
 
     force: str | None = None
     length: str | None = None
+    """Names in `UNITS`; None: numbers are in any one system, and texts are refused."""
 
     def __post_init__(self) -> None:
         """Check that both or none are given, and that they are what they should be."""

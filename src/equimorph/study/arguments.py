@@ -42,24 +42,16 @@ REQUIRED = inspect.Parameter.empty
 
 @dataclass(frozen=True)
 class Argument:
-    """An argument of a task, written as the value of one key.
-
-    Parameters
-    ----------
-    name
-        Of the parameter of the task.
-    key
-        Of the section.
-    written
-        Type of the value in the file.
-    default
-        Of the signature; `REQUIRED` without one.
-    """
+    """An argument of a task, written as the value of one key."""
 
     name: str
+    """Of the parameter of the task."""
     key: str
+    """Of the section."""
     written: Any
+    """Type of the value in the file."""
     default: Any = REQUIRED
+    """Of the signature; `REQUIRED` without one."""
 
     def keys(self) -> dict[str, tuple[Any, Any]]:
         """Keys with types and defaults, as pydantic takes them."""

@@ -84,18 +84,12 @@ DataFile = Annotated[
 
 @dataclass(frozen=True, eq=False)
 class ScheduleFile:
-    """A schedule that was read from its files.
-
-    Parameters
-    ----------
-    name
-        Of the table, as the study gives it.
-    schedule
-        What it holds.
-    """
+    """A schedule that was read from its files."""
 
     name: str
+    """Of the table, as the study gives it."""
     schedule: Schedule
+    """What it holds."""
 
     @property
     def fingerprint(self) -> str:

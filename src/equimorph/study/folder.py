@@ -31,18 +31,12 @@ _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 @dataclass(frozen=True)
 class ResultsFolder:
-    """An open results folder.
-
-    Parameters
-    ----------
-    path
-        Where it is.
-    study
-        Fingerprint of the study whose results it holds.
-    """
+    """An open results folder."""
 
     path: Path
+    """Where it is."""
     study: str
+    """Fingerprint of the study whose results it holds."""
 
     @property
     def checkpoints(self) -> Path:

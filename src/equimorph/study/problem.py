@@ -184,18 +184,12 @@ def parse_study(text: str, name: str, folder: Path | None = None) -> Study:
 
 @dataclass(frozen=True)
 class SoundPart:
-    """The tables of a wrong study that are right by themselves.
-
-    Parameters
-    ----------
-    study
-        Made of these tables.
-    places
-        Numbers of its entries in the lists of the file, by the names of the lists.
-    """
+    """The tables of a wrong study that are right by themselves."""
 
     study: Study
+    """Made of these tables."""
     places: Mapping[str, Sequence[int]]
+    """Numbers of its entries in the lists of the file, by the names of the lists."""
 
 
 def sound_part(text: str, error: ValidationError, folder: Path | None = None) -> SoundPart | None:

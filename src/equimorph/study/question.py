@@ -69,24 +69,16 @@ Drawing = Axes | Drawn
 
 @dataclass(frozen=True)
 class Figure:
-    """A figure of a study.
-
-    Parameters
-    ----------
-    files
-        Names of its files; the page shows the first.
-    draw
-        Draws it into a folder.
-    caption
-        What the page says below it, as plain text.
-    wide
-        Whether it takes a whole row of the page.
-    """
+    """A figure of a study."""
 
     files: tuple[str, ...]
+    """Names of its files; the page shows the first."""
     draw: Callable[[Path], None]
+    """Draws it into a folder."""
     caption: str
+    """What the page says below it, as plain text."""
     wide: bool = False
+    """Whether it takes a whole row of the page."""
 
 
 def still(name: str, draw: Callable[[], Drawing], caption: str, *, wide: bool = False) -> Figure:
@@ -129,30 +121,20 @@ class DataTable:
 
 @dataclass(frozen=True)
 class Question:
-    """A question of a study, with its names looked up.
-
-    Parameters
-    ----------
-    kind
-        Kind of the question.
-    key
-        Of its section in the file, for messages.
-    section
-        As it is written.
-    ground
-        What all questions share.
-    values
-        Arguments of the task, by name; states are chosen when the set is there.
-    extra
-        Further objects that the kind looks up.
-    """
+    """A question of a study, with its names looked up."""
 
     kind: "Kind[Any]"
+    """Kind of the question."""
     key: str
+    """Of its section in the file, for messages."""
     section: Any
+    """As it is written."""
     ground: Ground
+    """What all questions share."""
     values: Mapping[str, Any]
+    """Arguments of the task, by name; states are chosen when the set is there."""
     extra: Any = None
+    """Further objects that the kind looks up."""
 
     def __getitem__(self, name: str) -> Any:
         """Argument of the task; states are chosen from the set."""

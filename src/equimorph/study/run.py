@@ -41,26 +41,18 @@ class Checkpoints:
     An answer's file is named after a fingerprint of its question and a checksum of its content. It
     is found by asking the same question again, in this study or an edited one; a damaged file is
     not read.
-
-    Parameters
-    ----------
-    results
-        The results folder, open.
-    structure
-        To which the answers belong.
-    descriptors
-        Beside those of the structure, by name.
-    asked
-        Fingerprints of the questions of this run so far.
-    found
-        Those whose answers were there already.
     """
 
     results: ResultsFolder
+    """The results folder, open."""
     structure: Structure
+    """To which the answers belong."""
     descriptors: Mapping[str, Descriptor] = field(default_factory=dict)
+    """Beside those of the structure, by name."""
     asked: set[str] = field(default_factory=set)
+    """Fingerprints of the questions of this run so far."""
     found: set[str] = field(default_factory=set)
+    """Those whose answers were there already."""
 
     def answer(self, question: dict[str, Any], compute: Callable[[], Answer]) -> Answer:
         """Return the stored answer to a question; without one, compute it and store it.

@@ -39,22 +39,15 @@ Measured = Mapping[Descriptor | str, float]
 
 @dataclass(frozen=True)
 class Resolving:
-    """The measurement that best distinguishes the first candidate from the rest.
-
-    Parameters
-    ----------
-    descriptor
-        What to measure.
-    values
-        What each candidate would show.
-    separation
-        Least difference between the best candidate and another one, in standard errors of the
-        measurement; in units of the descriptor where no error was given.
-    """
+    """The measurement that best distinguishes the first candidate from the rest."""
 
     descriptor: Descriptor
+    """What to measure."""
     values: Values
+    """What each candidate would show."""
     separation: float
+    """Least difference between the best candidate and another one, in standard errors of the
+    measurement; in units of the descriptor where no error was given."""
 
 
 @dataclass(frozen=True)

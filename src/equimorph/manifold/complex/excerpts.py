@@ -109,24 +109,16 @@ def _outer_marks(eset: EquilibriumSet, facets: Facets) -> Items:
 
 @dataclass(frozen=True, eq=False)
 class Excerpt:
-    """Some cells of a set as a fabric, which costs nothing for the others.
-
-    Parameters
-    ----------
-    eset
-        The set.
-    fabric
-        The cells, before they are cut.
-    numbers
-        Their numbers in the set.
-    used
-        Vertices of the fabric, as numbers of those of `sheets_of` the set.
-    """
+    """Some cells of a set as a fabric, which costs nothing for the others."""
 
     eset: EquilibriumSet
+    """The set."""
     fabric: Fabric
+    """The cells, before they are cut."""
     numbers: Int[np.ndarray, " own"]
+    """Their numbers in the set."""
     used: VertexNumbers
+    """Vertices of the fabric, as numbers of those of `sheets_of` the set."""
 
     def put_back(self, fabric: Fabric | None = None) -> "Recut":
         """The set with the cells of the excerpt replaced by what was made of them, if anything.
@@ -157,29 +149,20 @@ class Excerpt:
 
 @dataclass(frozen=True, eq=False)
 class Recut:
-    """A set some of whose cells were cut: the vertices of its sheets, then new ones.
-
-    Parameters
-    ----------
-    eset
-        The set.
-    more
-        New vertices.
-    cells, cell_index
-        All cells.
-    facets, marks
-        Marked facets, those that were cut among them.
-    fresh
-        Cells that the set does not have.
-    """
+    """A set some of whose cells were cut: the vertices of its sheets, then new ones."""
 
     eset: EquilibriumSet
+    """The set."""
     more: Vertices
+    """New vertices."""
     cells: Cells
     cell_index: CellNumbers
+    """All cells."""
     facets: Int[np.ndarray, "F d"]
     marks: Int[np.ndarray, " F"]
+    """Marked facets, those that were cut among them."""
     fresh: CellFlags
+    """Cells that the set does not have."""
 
     @cached_property
     def points(self) -> VertexNumbers:

@@ -58,37 +58,26 @@ Guesses = Float[np.ndarray, "hits size"]
 
 @dataclass(frozen=True, eq=False)
 class Sheets:
-    """Cells of a set with their states, as the queries for states over points need them.
-
-    Parameters
-    ----------
-    points
-        States of the vertices.
-    free
-        Places of the free parameters.
-    cells, cell_index, component
-        Vertices of the cells, their index, and the pieces that they belong to.
-    whole
-        Facets of the cells, and how they hang together.
-    folded, capped
-        Whether vertices lie on folds, and on constraints.
-    constraints
-        Those that cut the set off.
-    crossings, cusps
-        Where sheets cross, and where folds turn back, if they do.
-    """
+    """Cells of a set with their states, as the queries for states over points need them."""
 
     points: States
+    """States of the vertices."""
     free: Int[np.ndarray, " d"]
+    """Places of the free parameters."""
     cells: Cells
     cell_index: CellNumbers
     component: CellNumbers
+    """Vertices of the cells, their index, and the pieces that they belong to."""
     whole: Adjacency
+    """Facets of the cells, and how they hang together."""
     folded: VertexFlags
     capped: VertexFlags
+    """Whether vertices lie on folds, and on constraints."""
     constraints: tuple[Constraint, ...]
+    """Those that cut the set off."""
     crossings: NearCrossings | None = None
     cusps: NearCusps | None = None
+    """Where sheets cross, and where folds turn back, if they do."""
 
     @property
     def structure(self) -> Structure:

@@ -23,18 +23,12 @@ Facets = Int[np.ndarray, "F d"]
 
 @dataclass(frozen=True)
 class Rims:
-    """Bands along facets, and the adjacent cells.
-
-    Parameters
-    ----------
-    bands
-        Index of simplices on the facets, as high as these are long.
-    beside
-        Cells that have each facet, −1 where there are fewer than of others.
-    """
+    """Bands along facets, and the adjacent cells."""
 
     bands: CellIndex
+    """Index of simplices on the facets, as high as these are long."""
     beside: Int[np.ndarray, "F most"]
+    """Cells that have each facet, −1 where there are fewer than of others."""
 
     @classmethod
     def of(cls, x: Places, whole: Adjacency, chosen: Int[np.ndarray, " F"]) -> "Rims":

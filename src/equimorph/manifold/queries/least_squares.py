@@ -55,28 +55,20 @@ def nearest(
 
 @dataclass
 class _Descent:
-    """Points on their way, each on a face: which sides it is held on.
-
-    Parameters
-    ----------
-    ground, residuals
-        Where the points may be, and what is to be small.
-    spot, value
-        The points and their norms.
-    held
-        For each point, whether it is held on a side: lower and upper sides of the box in turn,
-        then the constraints.
-    ended, minimum
-        Which points rest, and which of these at a minimum along their face.
-    """
+    """Points on their way, each on a face: which sides it is held on."""
 
     ground: Ground
     residuals: Residuals
+    """Where the points may be, and what is to be small."""
     spot: SetPoints
     value: Values
+    """The points and their norms."""
     held: Bool[np.ndarray, "lanes sides"]
+    """For each point, whether it is held on a side: lower and upper sides of the box in turn, then
+    the constraints."""
     ended: Flags
     minimum: Flags
+    """Which points rest, and which of these at a minimum along their face."""
 
     @classmethod
     def begun(cls, ground: Ground, spot: SetPoints, residuals: Residuals) -> "_Descent":

@@ -76,27 +76,18 @@ def local_minima(pairs: Pairs, value: Float[np.ndarray, " V"]) -> Some:
 
 @dataclass(frozen=True)
 class Ground:
-    """A set, or its part on folds, on sides of its box and on its constraints.
-
-    Parameters
-    ----------
-    setting
-        Of the set.
-    eset
-        The set; its box bounds the search.
-    fold
-        Whether only folds count.
-    sides
-        Places, among the free parameters, of those that keep their values: sides of the box.
-    cap
-        Whether only states at which a constraint is active count.
-    """
+    """A set, or its part on folds, on sides of its box and on its constraints."""
 
     setting: Setting
+    """Of the set."""
     eset: EquilibriumSet
+    """The set; its box bounds the search."""
     fold: bool = False
+    """Whether only folds count."""
     sides: tuple[int, ...] = ()
+    """Places, among the free parameters, of those that keep their values: sides of the box."""
     cap: bool = False
+    """Whether only states at which a constraint is active count."""
 
     def frames(self, spot: SetPoints) -> tuple[Frames, Rows]:
         """Orthonormal directions along which points may move, and bases of the tangent spaces."""

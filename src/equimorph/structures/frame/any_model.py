@@ -19,25 +19,17 @@ Model = TypeVar("Model", bound="AnyFrameModel")
 
 @dataclass(frozen=True, eq=False)
 class AnyFrameModel(ABC):
-    """Numbering of nodes and *scalars* y = (multipliers, p, 1), lengths, and loads.
-
-    Parameters
-    ----------
-    network
-        The frame as its user sees it.
-    patterns
-        What its parameters do, non-dimensional.
-    mesh
-        Elements of a piece of a member, of length 1.
-    length, bending
-        Units of length and of bending stiffness, in those of the user's `system`.
-    """
+    """Numbering of nodes and *scalars* y = (multipliers, p, 1), lengths, and loads."""
 
     network: AnyFrameNetwork
+    """The frame as its user sees it."""
     patterns: Patterns
+    """What its parameters do, non-dimensional."""
     mesh: Mesh
+    """Elements of a piece of a member, of length 1."""
     length: float
     bending: float
+    """Units of length and of bending stiffness, in those of the user's `system`."""
     system: UnitSystem
 
     @classmethod

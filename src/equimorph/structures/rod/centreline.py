@@ -31,21 +31,14 @@ Hessians = Float[np.ndarray, "lanes 2 2"]
 
 @dataclass(frozen=True, eq=False)
 class Centreline:
-    """Centreline of a rod at arclengths, with the axes of its cross-sections.
-
-    Attributes
-    ----------
-    places
-        Coordinates.
-    tangents
-        Unit vectors.
-    normals
-        The other axes of the cross-sections: in the plane one, on the left; in space n and b.
-    """
+    """Centreline of a rod at arclengths, with the axes of its cross-sections."""
 
     places: Vectors
+    """Coordinates."""
     tangents: Vectors
+    """Unit vectors."""
     normals: Float[np.ndarray, "lanes points normals axes"]
+    """The other axes of the cross-sections: in the plane one, on the left; in space n and b."""
 
 
 def curves_of(

@@ -35,29 +35,20 @@ SAFEST = 1e6
 
 @dataclass(frozen=True, eq=False)
 class Fibres:
-    """Fibres in the surface of a quarter of a cross-section; others bear no more.
-
-    Attributes
-    ----------
-    y, z
-        Distances from the axes b and n.
-    shear
-        Shear strain for a twist of 1.
-    round
-        Whether all axes are alike: bends about n and b are then one bend, about b.
-    E, nu
-        Young's modulus and Poisson's ratio.
-    EA
-        Axial stiffness.
-    """
+    """Fibres in the surface of a quarter of a cross-section; others bear no more."""
 
     y: Along
     z: Along
+    """Distances from the axes b and n."""
     shear: Along
+    """Shear strain for a twist of 1."""
     round: bool
+    """Whether all axes are alike: bends about n and b are then one bend, about b."""
     E: float
     nu: float
+    """Young's modulus and Poisson's ratio."""
     EA: float
+    """Axial stiffness."""
 
     def strain(self, strains: Strains, force: Sizes | None = None) -> Sizes:
         """Largest strain along the rod, for twists and curvatures about n and b, axial forces."""

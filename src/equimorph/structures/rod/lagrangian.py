@@ -18,26 +18,7 @@ Model = TypeVar("Model", bound="RodLagrangian")
 
 @dataclass(frozen=True, eq=False)
 class RodLagrangian(ABC):
-    """Lagrangian of a rod in its unknowns and its *scalars* y = (multipliers, parameters, 1).
-
-    Attributes
-    ----------
-    names
-        Parameters.
-    multipliers
-        Number of supports that act against each other along an axis.
-    held
-        Whether the rotations of the ends are prescribed.
-    quadratic
-        Q of the part ½ yᵀ Q y.
-    reaction
-        Force of the support at A.
-    origin
-        Coordinates of end A, or of end B where `from_start` is False. Like all rows, they combine
-        the scalars.
-    springs_along
-        Springs of the ends along axes.
-    """
+    """Lagrangian of a rod in its unknowns and its *scalars* y = (multipliers, parameters, 1)."""
 
     rows: ClassVar[tuple[str, ...]]
     """Further fields whose first axis counts the scalars."""
@@ -46,13 +27,21 @@ class RodLagrangian(ABC):
 
     mesh: Mesh
     names: tuple[str, ...]
+    """Parameters."""
     multipliers: int
+    """Number of supports that act against each other along an axis."""
     held: tuple[bool, bool]
+    """Whether the rotations of the ends are prescribed."""
     quadratic: Float[np.ndarray, "scalars scalars"]
+    """Q of the part ½ yᵀ Q y."""
     reaction: Float[np.ndarray, "axes scalars"]
+    """Force of the support at A."""
     origin: Float[np.ndarray, "axes scalars"]
+    """Coordinates of end A, or of end B where `from_start` is False. Like all rows, they combine
+    the scalars."""
     from_start: tuple[bool, ...]
     springs_along: SupportSprings
+    """Springs of the ends along axes."""
 
     @property
     def scalars(self) -> int:

@@ -36,14 +36,6 @@ BELOW, MODE_SWEEPS = 1e-6, 4
 class LateralStiffness:
     """Stiffness of a rod against twist and against bending out of its plane.
 
-    Parameters
-    ----------
-    torsion, lateral
-        GJ and EI about the axis in the plane, relative to the bending stiffness in the plane at the
-        same place: numbers, tables [[s, f], ...] or callables; positive.
-    kinks
-        Arclengths where a callable is not smooth.
-
     Raises
     ------
     InputError
@@ -52,7 +44,10 @@ class LateralStiffness:
 
     torsion: Any
     lateral: Any
+    """GJ and EI about the axis in the plane, relative to the bending stiffness in the plane at the
+    same place: numbers, tables [[s, f], ...] or callables; positive."""
     kinks: Sequence[float] = ()
+    """Arclengths where a callable is not smooth."""
 
     def __post_init__(self) -> None:
         """Check that both are positive."""
@@ -74,21 +69,14 @@ class LateralStiffness:
 
 @dataclass(frozen=True, eq=False)
 class Holding:
-    """Rotations that the supports prevent.
-
-    Parameters
-    ----------
-    free
-        Whether φ and ψ of end A, φ and ψ of end B are unknown.
-    closed
-        Whether ∫ψ = 0 because both ends are held in the plane.
-    from_start
-        Whether end A is held in the plane.
-    """
+    """Rotations that the supports prevent."""
 
     free: tuple[bool, bool, bool, bool]
+    """Whether φ and ψ of end A, φ and ψ of end B are unknown."""
     closed: bool
+    """Whether ∫ψ = 0 because both ends are held in the plane."""
     from_start: bool = True
+    """Whether end A is held in the plane."""
 
     @classmethod
     def of(cls, ends: tuple[End, End]) -> "Holding":

@@ -73,35 +73,27 @@ class RodModel(RodLagrangian):
     ``T = m · tension y`` of cables, quadrature weights m, and V of `pressure.EnclosedArea`. N/m is
     the compressive force and γ the axial compliance over m: a stretchable rod's strain is
     eliminated node by node. Prescribed end angles are ``turned y``.
-
-    Parameters
-    ----------
-    stiffness
-        Element matrices, with springs at the ends; `bending_stiffness` without.
-    slope
-        Coefficients of the angles, couples included; `element_slope` without, by element.
-    springs, rest
-        Stiffness of springs at the ends' angles, and where they are at rest.
-    pressure
-        p, on the enclosed area V.
-    closing
-        Q of V, see `pressure.closing`.
     """
 
     rows: ClassVar[tuple[str, ...]] = ("slope", "element_slope")
     last: ClassVar[tuple[str, ...]] = ("turned", "rest", "pressure")
 
     stiffness: Float[np.ndarray, "elements order order"]
+    """Element matrices, with springs at the ends; `bending_stiffness` without."""
     bending_stiffness: Float[np.ndarray, "elements order order"]
     nodal: Densities
     fine: Densities
     slope: Float[np.ndarray, "scalars nodes"]
+    """Coefficients of the angles, couples included; `element_slope` without, by element."""
     element_slope: Rows
     turned: Float[np.ndarray, "2 scalars"]
     springs: Float[np.ndarray, "2"]
     rest: Float[np.ndarray, "2 scalars"]
+    """Stiffness of springs at the ends' angles, and where they are at rest."""
     pressure: Float[np.ndarray, " scalars"]
+    """p, on the enclosed area V."""
     closing: Float[np.ndarray, "2 2"]
+    """Q of V, see `pressure.closing`."""
 
     @cached_property
     def sine(self) -> Float[np.ndarray, "scalars points"]:
@@ -271,25 +263,17 @@ def _supports(
 
 @dataclass(frozen=True, eq=False)
 class Packed:
-    """Nonzero coefficients of the scalars, packed for every point.
-
-    Attributes
-    ----------
-    points
-        For the nodes of every element the coefficients of sin θ, of cos θ and of the cables' pull.
-        The multipliers come first in each of the first two groups.
-    slope
-        Coefficients of θ at every node of the rod.
-    picks
-        Which scalars all these belong to, group by group.
-    splits
-        Where the second, third and fourth group begin in `picks`.
-    """
+    """Nonzero coefficients of the scalars, packed for every point."""
 
     points: Float[np.ndarray, "points many"]
+    """For the nodes of every element the coefficients of sin θ, of cos θ and of the cables' pull.
+    The multipliers come first in each of the first two groups."""
     slope: Float[np.ndarray, "nodes few"]
+    """Coefficients of θ at every node of the rod."""
     picks: Int[np.ndarray, " all"]
+    """Which scalars all these belong to, group by group."""
     splits: Int[np.ndarray, "3"]
+    """Where the second, third and fourth group begin in `picks`."""
 
 
 def pack_tables(model: RodModel) -> Packed:

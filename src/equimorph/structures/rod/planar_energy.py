@@ -20,40 +20,30 @@ class PlanarEnergy:
 
     ``L = ½ θᵀKθ − θ·(slope y) + Σ ((1 + e) N − ½ γ (N + T)²) + ½ yᵀ Q y − Σ p V`` with the sum over
     points, ``N = a sin θ + b cos θ`` at the node of each, and a, b, e, T combinations of y.
-
-    Parameters
-    ----------
-    place
-        Unknown of each node; −1 where its angle is prescribed: ``turned y``.
-    elements, stiffness, springs
-        Nodes and matrices of the elements, and springs at the nodes: K.
-    points
-        Node of each point.
-    sine, cosine, stretch, tension
-        a, b, e, T by scalar.
-    softness
-        γ.
-    quadratic
-        Q.
-    pressure, areas
-        p by scalar, and V, of each pressure.
     """
 
     place: Int[np.ndarray, " nodes"]
+    """Unknown of each node; −1 where its angle is prescribed: ``turned y``."""
     turned: Float[np.ndarray, "nodes scalars"]
     elements: Int[np.ndarray, "elements order"]
     stiffness: Float[np.ndarray, "elements order order"]
     springs: Float[np.ndarray, " nodes"]
+    """Nodes and matrices of the elements, and springs at the nodes: K."""
     slope: Float[np.ndarray, "scalars nodes"]
     points: Int[np.ndarray, " points"]
+    """Node of each point."""
     sine: Points
     cosine: Points
     stretch: Points
     tension: Points
+    """a, b, e, T by scalar."""
     softness: Float[np.ndarray, " points"]
+    """γ."""
     quadratic: Float[np.ndarray, "scalars scalars"]
+    """Q."""
     pressure: Float[np.ndarray, "areas scalars"]
     areas: tuple[EnclosedArea, ...] = ()
+    """p by scalar, and V, of each pressure."""
 
     def numbers(self) -> dict[str, Any]:
         """The tables in plain numbers; see `Equations.plain_energy`."""

@@ -72,21 +72,15 @@ class EnclosedArea:
     complex numbers it is ``½ Σ Wᵢⱼ Im(t̄ᵢ tⱼ)`` with an antisymmetric W, so that it does not change
     when all turns as a whole. Tangents at the nodes are u = exp(iθ) times what their node has as
     drawn: ``V = ½ Σ (Eᵢⱼ − i Wᵢⱼ) ūᵢ uⱼ + ½ Re(q d²)`` with d = Σ m u and q = Q₀₀ − i Q₀₁.
-
-    Parameters
-    ----------
-    matrix, even
-        W, and the symmetric E, which is zero where θ is measured from one axis everywhere.
-    weights
-        m.
-    closing
-        Q, which closes the area where an end moves along a line, see `closing`.
     """
 
     matrix: Float[np.ndarray, "nodes nodes"]
     even: Float[np.ndarray, "nodes nodes"]
+    """W, and the symmetric E, which is zero where θ is measured from one axis everywhere."""
     weights: Complex[np.ndarray, " nodes"]
+    """m."""
     closing: Float[np.ndarray, "2 2"]
+    """Q, which closes the area where an end moves along a line, see `closing`."""
 
     @classmethod
     def of_rod(cls, mesh: Mesh, closing: Float[np.ndarray, "2 2"]) -> "EnclosedArea":

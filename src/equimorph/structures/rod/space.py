@@ -29,25 +29,19 @@ class _Movement:
         twist        a (φ' − κψ) + a³ ψ h/6          lateral   a (ψ' + κφ) − a³ φ h/6
         in the plane  − a² h/2 + a⁴ r² h/24
         t → (1 − a² ψ²/2 + a⁴ ψ² r²/24) t + (a² φψ/2 − a⁴ φψ r²/24) n − (a ψ − a³ ψ r²/6) b
-
-    Attributes
-    ----------
-    twisted, bent
-        First-order strains.
-    square, wedge
-        r² and h.
-    second, fourth
-        Thrust of second and fourth order, that of the closure's force included.
     """
 
     phi: Points
     psi: Points
     twisted: Points
     bent: Points
+    """First-order strains."""
     square: Points
     wedge: Points
+    """r² and h."""
     second: Points
     fourth: Points
+    """Thrust of second and fourth order, that of the closure's force included."""
 
     @classmethod
     def of(cls, block: OutOfPlane, at: Coefficients, x: Movements) -> "_Movement":

@@ -41,27 +41,19 @@ class Units:
     Inside, lengths are measured by L, forces by 4π²B/L², moments and energies by 4π²B/L. Without
     bending stiffness and length the user's numbers are those; with them they are in the units of
     `system`.
-
-    Parameters
-    ----------
-    bending_stiffness
-        B = EI.
-    length
-        L.
-    system
-        Units of the user's numbers; SI if none are named.
-    mass
-        Of the whole rod, in kilograms, if it is given.
-    weight
-        Of a section, in units of force per length, if it is known; mass and weight exclude each
-        other.
     """
 
     bending_stiffness: float | None = None
+    """B = EI."""
     length: float | None = None
+    """L."""
     system: UnitSystem = field(default_factory=UnitSystem)
+    """Units of the user's numbers; SI if none are named."""
     mass: float | None = None
+    """Of the whole rod, in kilograms, if it is given."""
     weight: float | None = None
+    """Of a section, in units of force per length, if it is known; mass and weight exclude each
+    other."""
 
     def __post_init__(self) -> None:
         """Check that both or none are given, and positive."""

@@ -188,24 +188,16 @@ SpatialSupportSpec = (
 
 @dataclass(frozen=True, eq=False)
 class SpatialSupport:
-    """What holds a joint.
-
-    Parameters
-    ----------
-    directions
-        Orthonormal directions along which it holds the place.
-    stiffness
-        Of each of them; ∞ where it holds.
-    rotation
-        "free", "held", or the axis about which alone the joint turns.
-    data
-        What it is made from, as plain data.
-    """
+    """What holds a joint."""
 
     directions: Float[np.ndarray, "held 3"]
+    """Orthonormal directions along which it holds the place."""
     stiffness: Float[np.ndarray, " held"]
+    """Of each of them; ∞ where it holds."""
     rotation: str | tuple[float, float, float]
+    """How it turns: "free", "held", or the axis about which alone the joint turns."""
     data: Mapping[str, Any]
+    """What it is made from, as plain data."""
 
     @property
     def holds_rotation(self) -> bool:

@@ -42,19 +42,14 @@ class Fields:
 
 @dataclass(frozen=True, eq=False)
 class NodalFields:
-    """Fields at the nodes of every element; see `Fields`.
-
-    Attributes
-    ----------
-    largest, place
-        Largest bending curvature √(κ_n² + κ_b²), and its arclength.
-    """
+    """Fields at the nodes of every element; see `Fields`."""
 
     rotations: Float[np.ndarray, "lanes elements order 4"]
     places: Float[np.ndarray, "lanes elements order 3"]
     strains: Float[np.ndarray, "lanes elements order 3"]
     largest: Values
     place: Values
+    """Largest bending curvature √(κ_n² + κ_b²), and its arclength."""
 
 
 class SpatialFields:

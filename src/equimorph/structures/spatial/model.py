@@ -24,26 +24,18 @@ AXES = "tnb"
 
 @dataclass(frozen=True, eq=False)
 class SpatialEffects:
-    """What a term of amplitude 1 does.
-
-    Attributes
-    ----------
-    force
-        Load cumulated from end A, and `total` all of it.
-    moment
-        Part of the moment, on the axes of the cross-section, that does not come from strains.
-    natural
-        Intrinsic strains: twist, curvatures about n and b.
-    tension, torsion
-        Pull of cables along the rod, and the torsional stiffness that they give it.
-    """
+    """What a term of amplitude 1 does."""
 
     force: Float[np.ndarray, "elements order 3"]
+    """Load cumulated from end A, and `total` all of it."""
     total: Float[np.ndarray, "3"]
     moment: Float[np.ndarray, "elements order 3"]
+    """Part of the moment, on the axes of the cross-section, that does not come from strains."""
     natural: Float[np.ndarray, "elements order 3"]
+    """Intrinsic strains: twist, curvatures about n and b."""
     tension: Float[np.ndarray, "elements order"]
     torsion: Float[np.ndarray, "elements order"]
+    """Pull of cables along the rod, and the torsional stiffness that they give it."""
 
     @classmethod
     def none(cls, mesh: Mesh) -> "SpatialEffects":
@@ -105,31 +97,22 @@ Row = Float[np.ndarray, "scalars elements order"]
 
 @dataclass(frozen=True, eq=False)
 class Build:
-    """What a rod in space is made of, in non-dimensional form.
-
-    Attributes
-    ----------
-    stiffness
-        In the plane; `ratios` are those against twist and out of the plane to it.
-    natural
-        Intrinsic strains: twist, curvatures about n and b.
-    axial, shear
-        Stiffnesses against extension and, along n and b, against shear; None: rigid.
-    terms
-        What each amplitude scales, by name, in the order of the parameters.
-    length
-        That of the rod in the user's unit, in which the offsets of tendons are given.
-    """
+    """What a rod in space is made of, in non-dimensional form."""
 
     mesh: Mesh
     ends: Ends
     stiffness: LoadShape
+    """In the plane; `ratios` are those against twist and out of the plane to it."""
     ratios: tuple[LoadShape, LoadShape]
     natural: tuple[LoadShape, LoadShape, LoadShape]
+    """Intrinsic strains: twist, curvatures about n and b."""
     axial: LoadShape | None
     shear: tuple[LoadShape, LoadShape] | None
+    """Stiffnesses against extension and, along n and b, against shear; None: rigid."""
     terms: Mapping[str, Sequence[Term]]
+    """What each amplitude scales, by name, in the order of the parameters."""
     length: float = 1.0
+    """That of the rod in the user's unit, in which the offsets of tendons are given."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,27 +124,21 @@ class SpatialModel(RodLagrangian):
     from the rotations; a: the force ``f = Σ y force`` on the cross-section, on its axes t, n, b;
     ``b = Σ y moment``, ``T = Σ y tension``, ``τ = Σ y torsion``; γ: compliances against extension
     and shear, whose strains are eliminated at the nodes.
-
-    Attributes
-    ----------
-    stiffness
-        K: diagonal, against twist and bending about n and b.
-    softness
-        γ.
-    turned
-        Angles (a, b, τ) of clamps A and B as combinations of the scalars.
     """
 
     rows: ClassVar[tuple[str, ...]] = ("force", "moment", "tension", "torsion")
     last: ClassVar[tuple[str, ...]] = ("turned",)
 
     stiffness: Float[np.ndarray, "elements order 3"]
+    """K: diagonal, against twist and bending about n and b."""
     softness: Float[np.ndarray, "elements order 3"]
+    """γ."""
     force: Rows
     moment: Rows
     tension: Row
     torsion: Row
     turned: Float[np.ndarray, "2 3 scalars"]
+    """Angles (a, b, τ) of clamps A and B as combinations of the scalars."""
 
     @cached_property
     def soft(self) -> bool:

@@ -37,29 +37,20 @@ class Family(Rebuilt):
 
 @dataclass(frozen=True, eq=False)
 class Unknowns:
-    """True parameters as linear functions of unknowns x: p = base + Σ xₖ columnₖ.
-
-    Attributes
-    ----------
-    structure
-        The nominal one.
-    names
-        What each unknown is called.
-    start
-        Unknowns at which parameters and structure are the nominal ones.
-    base, columns
-        Of the linear function, one lane per state.
-    family, data
-        Structures by the unknowns among their data: name and place among the unknowns.
-    """
+    """True parameters as linear functions of unknowns x: p = base + Σ xₖ columnₖ."""
 
     structure: Structure
+    """The nominal one."""
     names: tuple[str, ...]
+    """What each unknown is called."""
     start: Vector
+    """Unknowns at which parameters and structure are the nominal ones."""
     base: Parameters
     columns: Float[np.ndarray, "k lanes parameters"]
+    """Of the linear function, one lane per state."""
     family: Family | None
     data: Mapping[str, int]
+    """Structures by the unknowns among their data: name and place among the unknowns."""
 
     def made(self, x: Vector) -> Structure:
         """Structure of some unknowns; refused if none has such data, like a negative stiffness."""

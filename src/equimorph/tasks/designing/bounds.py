@@ -232,18 +232,12 @@ class DesignBound:
 
 @dataclass(frozen=True)
 class VariableBounds:
-    """All bounds on functions of the variables: g(x) = 0 and h(x) ≥ 0.
-
-    Parameters
-    ----------
-    family
-        Family with the variables.
-    bounds
-        Bounds on functions.
-    """
+    """All bounds on functions of the variables: g(x) = 0 and h(x) ≥ 0."""
 
     family: DesignFamily
+    """Family with the variables."""
     bounds: tuple[DesignBound, ...]
+    """Bounds on functions."""
 
     def equal(self, x: Vector) -> Numbers:
         """What must vanish."""

@@ -27,24 +27,17 @@ KEPT = 64
 
 @dataclass
 class DesignFamily:
-    """The structures of a family by the vector of its variables, each scaled to 0 … 1.
-
-    Parameters
-    ----------
-    make
-        Structure of variables by name.
-    names, shapes
-        What they are called; the shape of each: () for a number.
-    low, width, given
-        Lower bounds, widths of the ranges, and start of all entries in turn.
-    """
+    """The structures of a family by the vector of its variables, each scaled to 0 … 1."""
 
     make: Callable[..., Structure]
+    """Structure of variables by name."""
     names: tuple[str, ...]
     shapes: tuple[tuple[int, ...], ...]
+    """What they are called; the shape of each: () for a number."""
     low: Vector
     width: Vector
     given: Vector
+    """Lower bounds, widths of the ranges, and start of all entries in turn."""
     _made: dict[bytes, Structure] = field(default_factory=dict)
 
     @classmethod

@@ -32,33 +32,22 @@ TRIALS = 2
 
 @dataclass(frozen=True)
 class Piece:
-    """Values of a state that is stationary along the set, and how it is found again.
-
-    Parameters
-    ----------
-    kind
-        What the state is: "start", "goal", "fold", "saddle", ….
-    state
-        The state.
-    values
-        Values there, which are made small or held below zero.
-    scalars
-        Functions with these values; stationary along `tangents`.
-    free
-        Places of the free parameters.
-    tangents
-        As many changes (dz, dp) along the set.
-    follow
-        The piece of another structure near a guess; None if there is none.
-    """
+    """Values of a state that is stationary along the set, and how it is found again."""
 
     kind: str
+    """What the state is: "start", "goal", "fold", "saddle", …."""
     state: State
+    """The state."""
     values: Vector
+    """Values there, which are made small or held below zero."""
     scalars: Scalars
+    """Functions with these values; stationary along `tangents`."""
     free: Some
+    """Places of the free parameters."""
     tangents: Carried
+    """As many changes (dz, dp) along the set."""
     follow: Follow
+    """The piece of another structure near a guess; None if there is none."""
 
     def slopes(self, family: DesignFamily, x: Vector) -> Float[np.ndarray, "m k"]:
         """Derivatives of the values by the scaled variables."""

@@ -29,30 +29,20 @@ from equimorph.tasks.planning.objectives import Extreme
 
 @dataclass(frozen=True)
 class Answer:
-    """What a question has for an answer, on one structure.
-
-    Parameters
-    ----------
-    value
-        In its own sign; NaN if it has none.
-    pieces
-        Their largest value is made small.
-    bounds
-        Pieces whose values must not be positive.
-    near
-        States near which the question is asked of the next structure.
-    found
-        The limit load, or the bottleneck of the route.
-    why
-        Why it has no value.
-    """
+    """What a question has for an answer, on one structure."""
 
     value: float
+    """In its own sign; NaN if it has none."""
     pieces: tuple[Piece, ...] = ()
+    """Their largest value is made small."""
     bounds: tuple[Piece, ...] = ()
+    """Pieces whose values must not be positive."""
     near: tuple[State, ...] = ()
+    """States near which the question is asked of the next structure."""
     found: Any = None
+    """The limit load, or the bottleneck of the route."""
     why: str = ""
+    """Why it has no value."""
 
 
 class Question(Protocol):

@@ -28,22 +28,15 @@ STEPS = 30
 
 @dataclass(frozen=True)
 class DesignProblem:
-    """A family, what is asked about its structures, and bounds.
-
-    Parameters
-    ----------
-    family
-        The structures.
-    objectives, within
-        Questions of which the worst one is made better, and bounds.
-    tolerance
-        Relative change of the value that counts as none.
-    """
+    """A family, what is asked about its structures, and bounds."""
 
     family: DesignFamily
+    """The structures."""
     objectives: tuple[Asked, ...]
     within: tuple[DesignBound, ...]
+    """Questions of which the worst one is made better, and bounds."""
     tolerance: float
+    """Relative change of the value that counts as none."""
 
     @property
     def questions(self) -> list[tuple[Asked, DesignBound | None]]:
@@ -246,18 +239,12 @@ class DesignStep:
 
 @dataclass
 class DesignSearch:
-    """The designs of a family under questions and bounds.
-
-    Parameters
-    ----------
-    problem
-        What is asked.
-    most
-        Rebuilds allowed.
-    """
+    """The designs of a family under questions and bounds."""
 
     problem: DesignProblem
+    """What is asked."""
     most: int
+    """Rebuilds allowed."""
     rebuilds: int = 0
     history: list[DesignStep] = field(default_factory=list)
     trust: float = TRUST

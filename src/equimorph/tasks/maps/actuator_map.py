@@ -31,25 +31,7 @@ from equimorph.tolerances import IN_BOX
 
 @dataclass(frozen=True, eq=False)
 class ActuatorMap(Tabular):
-    """Values at the vertices of a grid of settings, and the curves on which they jump or bend.
-
-    Attributes
-    ----------
-    structure, grid, load, within, fixed
-        The arguments of the map.
-    value
-        Value at every vertex of the grid; NaN where the map is not defined.
-    status
-        Number in `kinds` of what happened on the path.
-    states
-        States at the ends of the paths, row by row; NaN where no path exists.
-    curves
-        Where the map is not smooth.
-    sheet
-        Unloaded states.
-    bound
-        Largest load, up to which paths are followed.
-    """
+    """Values at the vertices of a grid of settings, and the curves on which they jump or bend."""
 
     kinds: ClassVar[tuple[str, ...]]
 
@@ -58,12 +40,19 @@ class ActuatorMap(Tabular):
     load: str
     within: tuple[Constraint, ...]
     fixed: Mapping[str, float]
+    """The arguments of the map."""
     value: Float[np.ndarray, "rows columns"]
+    """Value at every vertex of the grid; NaN where the map is not defined."""
     status: Int[np.ndarray, "rows columns"]
+    """Number in `kinds` of what happened on the path."""
     states: States
+    """States at the ends of the paths, row by row; NaN where no path exists."""
     curves: tuple[MapCurve, ...]
+    """Where the map is not smooth."""
     sheet: NaturalSheet
+    """Unloaded states."""
     bound: float
+    """Largest load, up to which paths are followed."""
 
     def __repr__(self) -> str:
         """Size, how many of each status, and the curves."""

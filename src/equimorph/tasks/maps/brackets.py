@@ -23,31 +23,22 @@ ASIDE = (0.0, 0.4, -0.37)
 
 @dataclass(frozen=True)
 class Samples(Columns):
-    """Values of a map at settings, with the states that they were read from.
-
-    Attributes
-    ----------
-    setting
-        Where.
-    value
-        What the map shows; not a number where it is not defined.
-    kind
-        Number of the status.
-    place
-        Which constraint, and where on the structure it is met; zero where it says nothing.
-    z, p
-        State and all parameters; not numbers where there is no state.
-    passed
-        Critical states on the way, a tuple of `Passed` for each lane; none in maps that do not ask.
-    """
+    """Values of a map at settings, with the states that they were read from."""
 
     setting: Settings
+    """Where."""
     value: Values
+    """What the map shows; not a number where it is not defined."""
     kind: Int[np.ndarray, " lanes"]
+    """Number of the status."""
     place: Values
+    """Which constraint, and where on the structure it is met; zero where it says nothing."""
     z: Lanes
     p: Parameters
+    """State and all parameters; not numbers where there is no state."""
     passed: Shaped[np.ndarray, " lanes"]
+    """Critical states on the way, a tuple of `Passed` for each lane; none in maps that do not
+    ask."""
 
 
 Sampler = Callable[[Settings], Samples]
@@ -67,19 +58,13 @@ def sample_distance(structure: Structure, a: Samples, b: Samples) -> Values:
 
 @dataclass(frozen=True)
 class Brackets(Columns):
-    """Pairs of settings between which a map may not be smooth, and the grid edges they lie on.
-
-    Attributes
-    ----------
-    a, b
-        Samples at both ends.
-    edge
-        Number of the edge.
-    """
+    """Pairs of settings between which a map may not be smooth, and the grid edges they lie on."""
 
     a: Samples
     b: Samples
+    """Samples at both ends."""
     edge: Int[np.ndarray, " brackets"]
+    """Number of the edge."""
 
     def __len__(self) -> int:
         """Return the number of pairs."""

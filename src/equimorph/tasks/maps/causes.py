@@ -77,27 +77,18 @@ class Cause:
 
 @dataclass(frozen=True)
 class Paths(ABC):
-    """Paths in a load that start at natural states, and what a map reads along them.
-
-    Attributes
-    ----------
-    sheet
-        Natural states.
-    load
-        Place of the parameter along which paths run.
-    within
-        Constraints that end paths.
-    bound
-        Largest load up to which paths are followed.
-    options
-        Step control.
-    """
+    """Paths in a load that start at natural states, and what a map reads along them."""
 
     sheet: NaturalSheet
+    """Natural states."""
     load: int
+    """Place of the parameter along which paths run."""
     within: tuple[Constraint, ...]
+    """Constraints that end paths."""
     bound: float
+    """Largest load up to which paths are followed."""
     options: TraceOptions
+    """Step control."""
 
     def __call__(self, settings: Settings) -> Samples:
         """Samples of the map."""

@@ -161,18 +161,12 @@ def curvature_map(  # noqa: PLR0913  # the knobs of the public face, most by key
 
 @dataclass(frozen=True)
 class FirstStablePaths(Paths):
-    """The first stable state with load `at` on the path that starts at each natural state.
-
-    Attributes
-    ----------
-    at
-        The given load.
-    descriptor
-        What the map shows.
-    """
+    """The first stable state with load `at` on the path that starts at each natural state."""
 
     at: float
+    """The given load."""
     descriptor: Descriptor
+    """What the map shows."""
 
     def follow(self, start: Samples) -> Samples:
         """Values with their states and what happens on the way."""

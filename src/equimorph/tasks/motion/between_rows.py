@@ -24,23 +24,16 @@ it is on their branch."""
 
 @dataclass(frozen=True)
 class BetweenRows:
-    """A motion whose rows meet targets, and what happens half-way between the rows.
-
-    Parameters
-    ----------
-    path
-        The exact states of the rows.
-    legs, descriptors, actuators
-        Targets, what has targets, and the parameters that are solved for.
-    within
-        Constraints to obey.
-    """
+    """A motion whose rows meet targets, and what happens half-way between the rows."""
 
     path: Path
+    """The exact states of the rows."""
     legs: Sequence[Leg]
     descriptors: tuple[Descriptor, ...]
     actuators: tuple[str, ...]
+    """Targets, what has targets, and the parameters that are solved for."""
     within: tuple[Constraint, ...]
+    """Constraints to obey."""
 
     @property
     def largest(self) -> dict[str, float]:

@@ -34,26 +34,18 @@ class Course:
 
     Time counts legs: 1.5 is half-way through the second. Columns are all parameters (those of the
     actuators do not count) and then the targets.
-
-    Parameters
-    ----------
-    structure
-        What moves.
-    descriptors
-        What has targets, the same on all legs.
-    free
-        Places of the actuators.
-    corners
-        Columns at the ends of the legs, the start first.
-    curves
-        Legs that are curves, by number.
     """
 
     structure: Structure
+    """What moves."""
     descriptors: tuple[Descriptor, ...]
+    """What has targets, the same on all legs."""
     free: Int[np.ndarray, " k"]
+    """Places of the actuators."""
     corners: Float[np.ndarray, "corners columns"]
+    """Columns at the ends of the legs, the start first."""
     curves: dict[int, Any]
+    """Legs that are curves, by number."""
 
     @classmethod
     def of(cls, start: State, legs: Sequence[Leg], actuators: Sequence[str]) -> "Course":

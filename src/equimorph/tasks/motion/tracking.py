@@ -214,26 +214,18 @@ def track(  # the knobs of the public face, all by keyword
 
 @dataclass(frozen=True)
 class _Motion:
-    """Targets, actuators and bounds of a motion.
-
-    Parameters
-    ----------
-    start, legs
-        State from which the targets are followed, and the targets.
-    names
-        The actuators.
-    within
-        Constraints to obey.
-    limits, bounds
-        Limits of the actuators by name, and as constraints.
-    """
+    """Targets, actuators and bounds of a motion."""
 
     start: State
     legs: Sequence[Leg]
+    """State from which the targets are followed, and the targets."""
     names: tuple[str, ...]
+    """The actuators."""
     within: tuple[Constraint, ...]
+    """Constraints to obey."""
     limits: Mapping[str, tuple[float, float]]
     bounds: tuple[Constraint, ...]
+    """Limits of the actuators by name, and as constraints."""
 
     @property
     def course(self) -> Course:

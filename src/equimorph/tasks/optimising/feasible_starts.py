@@ -36,21 +36,14 @@ STARTS = 24
 
 @dataclass(frozen=True)
 class FeasibleStarts:
-    """Feasible states between infeasible vertices, or else the least violation.
-
-    Parameters
-    ----------
-    spots
-        States from which a descent may start, none where `least` is positive.
-    least
-        Least largest relative excess that was found; not positive where there are states.
-    closest
-        Where it is.
-    """
+    """Feasible states between infeasible vertices, or else the least violation."""
 
     spots: SetPoints
+    """States from which a descent may start, none where `least` is positive."""
     least: float
+    """Least largest relative excess that was found; not positive where there are states."""
     closest: SetPoints
+    """Where it is."""
 
 
 def feasible_points_in_cells(

@@ -134,27 +134,18 @@ def follow_optimum(
 
 @dataclass(frozen=True)
 class MovingProblem:
-    """Optima along a course.
-
-    Parameters
-    ----------
-    course
-        Loads and targets.
-    goal
-        Objective at the columns of a time.
-    rules
-        Constraints, stability among them.
-    bounds
-        Limits of the actuators.
-    held
-        Whether the targets hold exactly; else the objective deals with them.
-    """
+    """Optima along a course."""
 
     course: Course
+    """Loads and targets."""
     goal: Goal
+    """Objective at the columns of a time."""
     rules: tuple[Constraint, ...]
+    """Constraints, stability among them."""
     bounds: tuple[Constraint, ...]
+    """Limits of the actuators."""
     held: bool
+    """Whether the targets hold exactly; else the objective deals with them."""
 
     def programme(self, time: float) -> Programme:
         """Programme at a time."""
@@ -186,27 +177,18 @@ class _Found:
 
 @dataclass
 class _Track:
-    """Optima followed so far, and where the next one is looked for.
-
-    Parameters
-    ----------
-    problem
-        What is followed.
-    optima
-        Optima in order of time; the last is where the search stands.
-    jumps
-        Jumps met so far.
-    step
-        Time step to try next.
-    failure
-        Earliest time at which no optimum continued the last one; ∞ if none is known.
-    """
+    """Optima followed so far, and where the next one is looked for."""
 
     problem: MovingProblem
+    """What is followed."""
     optima: list[_Found]
+    """Optima in order of time; the last is where the search stands."""
     jumps: list[Jump] = field(default_factory=list)
+    """Jumps met so far."""
     step: float = FIRST
+    """Time step to try next."""
     failure: float = np.inf
+    """Earliest time at which no optimum continued the last one; ∞ if none is known."""
 
     @property
     def last(self) -> _Found:

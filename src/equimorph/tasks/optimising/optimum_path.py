@@ -18,22 +18,15 @@ CLOSE = 0.02
 
 @dataclass(frozen=True, eq=False)
 class Jump:
-    """Where an optimum ceases to be one, and where the descent from there ends.
-
-    Parameters
-    ----------
-    at
-        Number of the leg plus the fraction of it.
-    before, after
-        States on both sides; `after` is None if there is no optimum beyond.
-    values
-        Objective on both sides; nan where no optimum exists.
-    """
+    """Where an optimum ceases to be one, and where the descent from there ends."""
 
     at: float
+    """Number of the leg plus the fraction of it."""
     before: State
     after: State | None
+    """States on both sides; `after` is None if there is no optimum beyond."""
     values: tuple[float, float]
+    """Objective on both sides; nan where no optimum exists."""
 
 
 @dataclass(frozen=True, eq=False)

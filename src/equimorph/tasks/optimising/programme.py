@@ -133,24 +133,16 @@ class Expansion:
 
 @dataclass(frozen=True)
 class Programme:
-    """Least largest branch of an objective on a set, within its box and constraints.
-
-    Parameters
-    ----------
-    setting
-        Structure and free parameters.
-    bounds
-        Limits of the free parameters.
-    objective
-        What is made small.
-    constraints
-        Those that count, stability among them.
-    """
+    """Least largest branch of an objective on a set, within its box and constraints."""
 
     setting: Setting
+    """Structure and free parameters."""
     bounds: tuple[Constraint, ...]
+    """Limits of the free parameters."""
     objective: Objective
+    """What is made small."""
     constraints: tuple[Constraint, ...]
+    """Those that count, stability among them."""
 
     @classmethod
     def over(

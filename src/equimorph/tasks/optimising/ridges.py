@@ -37,30 +37,20 @@ MET = 1e-6
 
 @dataclass(frozen=True)
 class Ridge:
-    """Highest point of a curve of a map.
-
-    Parameters
-    ----------
-    setting
-        Where.
-    value
-        Limit load on the curve, or on the higher side of a cliff.
-    slope
-        Slope of the load along the curve, per unit of length; zero at an exact optimum.
-    across
-        Direction across the curve in the plane of settings, of unit length in scales.
-    cliff
-        Whether the value is the limit from one side only.
-    sides
-        Of a cliff: limit loads on both sides, at distances `BESIDE`.
-    """
+    """Highest point of a curve of a map."""
 
     setting: Pair
+    """Where."""
     value: float
+    """Limit load on the curve, or on the higher side of a cliff."""
     slope: float
+    """Slope of the load along the curve, per unit of length; zero at an exact optimum."""
     across: Pair
+    """Direction across the curve in the plane of settings, of unit length in scales."""
     cliff: bool
+    """Whether the value is the limit from one side only."""
     sides: Float[np.ndarray, "2 distances"] | None = None
+    """Of a cliff: limit loads on both sides, at distances `BESIDE`."""
 
 
 def highest_point(lmap: LimitLoadMap, curve: MapCurve) -> Ridge | None:

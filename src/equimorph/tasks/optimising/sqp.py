@@ -33,27 +33,18 @@ FLAT = 1e-4
 
 @dataclass(frozen=True)
 class CriticalPoint:
-    """A point at which the conditions of Karush, Kuhn and Tucker hold: an optimum, or a pass.
-
-    Parameters
-    ----------
-    point
-        The point, one lane.
-    frames
-        Orthonormal tangents there.
-    expansion
-        Values and derivatives there.
-    answer
-        Multipliers.
-    converged
-        Whether the last step was at round-off.
-    """
+    """A point at which the conditions of Karush, Kuhn and Tucker hold: an optimum, or a pass."""
 
     point: SetPoints
+    """The point, one lane."""
     frames: Frames
+    """Orthonormal tangents there."""
     expansion: Expansion
+    """Values and derivatives there."""
     answer: QuadraticStep
+    """Multipliers."""
     converged: bool
+    """Whether the last step was at round-off."""
 
     @property
     def binding(self) -> tuple[Int[np.ndarray, " m"], Int[np.ndarray, " k"]]:

@@ -45,30 +45,20 @@ SAME_VALUE = 1e-7
 
 @dataclass(frozen=True, eq=False)
 class Passing:
-    """A bottleneck, and how a route passes it.
-
-    Parameters
-    ----------
-    bottleneck
-        The exact one.
-    bound
-        What routes obey that come as near to it as the slack allows.
-    over
-        States over the pass that is highest on the way, which obey it; None if none is known.
-    way
-        States from start to goal along the lowest way over the mesh, which obey it.
-    point
-        The pass with the conditions that hold there, if the bottleneck is one.
-    reach
-        Size of the cells around it.
-    """
+    """A bottleneck, and how a route passes it."""
 
     bottleneck: Bottleneck
+    """The exact one."""
     bound: Constraint
+    """What routes obey that come as near to it as the slack allows."""
     over: States | None
+    """States over the pass that is highest on the way, which obey it; None if none is known."""
     way: States
+    """States from start to goal along the lowest way over the mesh, which obey it."""
     point: CriticalPoint | None = None
+    """The pass with the conditions that hold there, if the bottleneck is one."""
     reach: float = 0.0
+    """Size of the cells around it."""
 
 
 def find_bottleneck(

@@ -57,37 +57,25 @@ Each = Float[np.ndarray, " routes"]
 
 @dataclass(frozen=True)
 class Curves(Columns):
-    """Nodes of curves on a set, curve after curve.
-
-    Parameters
-    ----------
-    route
-        Number of the curve of each node.
-    z, p
-        The nodes.
-    rows
-        Planes near the tangent spaces.
-    walls
-        Distances from the walls, between the ends of the curves.
-    forces
-        Of the walls.
-    pairs
-        Softest modes.
-    floor
-        Least margin of each node.
-    share
-        Of the leg that leads to a node in the length of its curve; one at the first node.
-    """
+    """Nodes of curves on a set, curve after curve."""
 
     route: Routes
+    """Number of the curve of each node."""
     z: Lanes
     p: Parameters
+    """The nodes."""
     rows: Rows
+    """Planes near the tangent spaces."""
     walls: Walls
+    """Distances from the walls, between the ends of the curves."""
     forces: Walls
+    """Of the walls."""
     pairs: Pairs
+    """Softest modes."""
     floor: Values
+    """Least margin of each node."""
     share: Values
+    """Of the leg that leads to a node in the length of its curve; one at the first node."""
 
     @property
     def legs(self) -> Some:
@@ -113,18 +101,12 @@ class Curves(Columns):
 
 @dataclass(frozen=True)
 class CurveSteps:
-    """Newton's method for curves on a set within demands.
-
-    Parameters
-    ----------
-    eset
-        The set.
-    demands
-        Constraints that every node obeys; floors of margins belong to the curves.
-    """
+    """Newton's method for curves on a set within demands."""
 
     eset: EquilibriumSet
+    """The set."""
     demands: Demands
+    """Constraints that every node obeys; floors of margins belong to the curves."""
 
     @cached_property
     def setting(self) -> Setting:

@@ -68,26 +68,18 @@ def _passages(eset: EquilibriumSet) -> Passages:
 
 @dataclass(frozen=True)
 class Filtration:
-    """Facets between stable cells, and the level at which each of them opens.
-
-    Parameters
-    ----------
-    eset, objective, constraints
-        The set, what is kept low, and the bounds in addition to those of the set.
-    passages
-        Stable cells and the facets between them.
-    level
-        Least value on each facet within the constraints; ∞ where nothing obeys them.
-    shares
-        Where on the facet it is, in barycentric coordinates.
-    """
+    """Facets between stable cells, and the level at which each of them opens."""
 
     eset: EquilibriumSet
     objective: Objective
     constraints: tuple[Constraint, ...]
+    """The set, what is kept low, and the bounds in addition to those of the set."""
     passages: Passages
+    """Stable cells and the facets between them."""
     level: ItemValues
+    """Least value on each facet within the constraints; ∞ where nothing obeys them."""
     shares: Shares
+    """Where on the facet it is, in barycentric coordinates."""
 
     @classmethod
     def of(

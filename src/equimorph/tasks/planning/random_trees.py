@@ -25,19 +25,13 @@ INSIDE = 0.02
 
 @dataclass(frozen=True)
 class LoadCourse:
-    """Settings: actuators in a box, and the place s = 0 … legs along a polyline of loads.
-
-    Parameters
-    ----------
-    box, free
-        Limits of the actuators, and their places among the parameters.
-    corners
-        All parameters at the corners of the polyline.
-    """
+    """Settings: actuators in a box, and the place s = 0 … legs along a polyline of loads."""
 
     box: Box
     free: Int[np.ndarray, " d"]
+    """Limits of the actuators, and their places among the parameters."""
     corners: Float[np.ndarray, "corners parameters"]
+    """All parameters at the corners of the polyline."""
 
     @property
     def legs(self) -> int:

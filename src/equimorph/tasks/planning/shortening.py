@@ -53,18 +53,12 @@ what is free that is kept for them; and the relative error of losses."""
 
 @dataclass(frozen=True)
 class Shortener:
-    """Search for the shortest curves within demands.
-
-    Parameters
-    ----------
-    eset
-        The set.
-    demands
-        Margin and constraints that every node obeys.
-    """
+    """Search for the shortest curves within demands."""
 
     eset: EquilibriumSet
+    """The set."""
     demands: Demands
+    """Margin and constraints that every node obeys."""
 
     @property
     def _closely(self) -> Demands:

@@ -29,25 +29,17 @@ ROUNDS, DIVISIONS = 3, 8
 
 @dataclass(frozen=True)
 class SnapPlace:
-    """A place of a fold from which a route snaps.
-
-    Parameters
-    ----------
-    fold, landing
-        The place, and where the snap lands.
-    approach
-        State just before the fold, on the way there.
-    beyond
-        Equilibrium after the snap where the parameters have gone a little beyond the fold.
-    cost
-        Of the straight moves there and on.
-    """
+    """A place of a fold from which a route snaps."""
 
     fold: State
     landing: State
+    """The place, and where the snap lands."""
     approach: State
+    """State just before the fold, on the way there."""
     beyond: State
+    """Equilibrium after the snap where the parameters have gone a little beyond the fold."""
     cost: float
+    """Of the straight moves there and on."""
 
 
 @dataclass(frozen=True)

@@ -49,24 +49,16 @@ NOWHERE = "not even by snaps does the goal lie on a piece that can be reached"
 
 @dataclass(frozen=True)
 class Gate:
-    """A place where stability can be lost on purpose.
-
-    Parameters
-    ----------
-    sources
-        Stable vertices next to the fold.
-    costs
-        Of the chords from these to the fold.
-    snap
-        The run of the stability boundary that it belongs to.
-    landing
-        Where the snap leads.
-    """
+    """A place where stability can be lost on purpose."""
 
     sources: Int[np.ndarray, " sources"]
+    """Stable vertices next to the fold."""
     costs: Float[np.ndarray, " sources"]
+    """Of the chords from these to the fold."""
     snap: Snap
+    """The run of the stability boundary that it belongs to."""
     landing: Landing
+    """Where the snap leads."""
 
 
 @dataclass(frozen=True)

@@ -22,32 +22,22 @@ from equimorph.tasks.shapes.solutions import solve_shape
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """Whether target values can be reached from a state; if not, what prevents it.
-
-    Parameters
-    ----------
-    status
-        "reachable": a verified motion leads there through the start's region. "refused": none does;
-        `why` says what stops it, or where else such states are.
-    states
-        All stable states of the start's piece of the set that show the values.
-    region
-        Number of the region that each lies in, −1 if not known.
-    straight
-        Motion along the straight line in descriptor space, or where and why it ends.
-    route
-        Motion inside the region where the straight one fails; None if it is not needed.
-    closest
-        Vertex of the start's region whose descriptors come nearest, each measured by its range.
-    """
+    """Whether target values can be reached from a state; if not, what prevents it."""
 
     status: Literal["reachable", "refused"]
+    """One of these. "reachable": a verified motion leads there through the start's region.
+    "refused": none does; `why` says what stops it, or where else such states are."""
     why: str
     states: States
+    """All stable states of the start's piece of the set that show the values."""
     region: Int[np.ndarray, " lanes"]
+    """Number of the region that each lies in, −1 if not known."""
     straight: Tracking
+    """Motion along the straight line in descriptor space, or where and why it ends."""
     route: Route | None
+    """Motion inside the region where the straight one fails; None if it is not needed."""
     closest: State
+    """Vertex of the start's region whose descriptors come nearest, each measured by its range."""
 
     def __repr__(self) -> str:
         """Whether it can, and why not."""

@@ -22,52 +22,35 @@ Kind = Literal["snap-through", "singular Jacobian", "actuator limit", "constrain
 
 @dataclass(frozen=True, eq=False)
 class BoundaryPiece:
-    """A connected piece of the boundary of a region, of one kind.
-
-    Parameters
-    ----------
-    kind
-        Why motions end there. "snap-through": stability is lost. "singular Jacobian": the
-        parameters cannot move the descriptors on. "actuator limit": a side of the box.
-        "constraint". "open": the set is incomplete there.
-    detail
-        Which side of the box (``Theta = 2.5``) or constraint.
-    vertices
-        Numbers of the region's vertices: one point (d = 1), a polyline, closed ones with the first
-        repeated (d = 2), or triangles, one a row (d = 3).
-    states
-        Exact states of `vertices` in order (of the corners of triangles, each once).
-    values
-        Descriptors of `states`.
-    """
+    """A connected piece of the boundary of a region, of one kind."""
 
     kind: Kind
+    """Why motions end there. "snap-through": stability is lost. "singular Jacobian": the parameters
+    cannot move the descriptors on. "actuator limit": a side of the box. "constraint". "open": the
+    set is incomplete there."""
     detail: str
+    """Which side of the box (``Theta = 2.5``) or constraint."""
     vertices: Int[np.ndarray, "..."]
+    """Numbers of the region's vertices: one point (d = 1), a polyline, closed ones with the first
+    repeated (d = 2), or triangles, one a row (d = 3)."""
     states: States
+    """Exact states of `vertices` in order (of the corners of triangles, each once)."""
     values: Float[np.ndarray, "states k"]
+    """Descriptors of `states`."""
 
 
 @dataclass(frozen=True, eq=False)
 class Region:
-    """A connected region of stable states, as cells of a set, and its image under descriptors.
-
-    Parameters
-    ----------
-    eset
-        The region as a set; its boundary consists of exact states.
-    descriptors
-        Descriptors that the parameters control.
-    side
-        Sign of det J_S on it; 0 where the set was not cut along det J_S = 0.
-    singular
-        Vertices at which det J_S = 0.
-    """
+    """A connected region of stable states, as cells of a set, and its image under descriptors."""
 
     eset: EquilibriumSet
+    """The region as a set; its boundary consists of exact states."""
     descriptors: tuple[Descriptor, ...]
+    """Descriptors that the parameters control."""
     side: int
+    """Sign of det J_S on it; 0 where the set was not cut along det J_S = 0."""
     singular: Bool[np.ndarray, " V"]
+    """Vertices at which det J_S = 0."""
 
     def __repr__(self) -> str:
         """Number of cells and kinds of its boundary."""

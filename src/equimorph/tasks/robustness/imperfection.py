@@ -43,24 +43,17 @@ class Law:
     """How the change of a limit load begins [Koiter1945]_.
 
     The change is a power series in ``x = sign(ε)·|ε|^(1/root)`` that begins with ``|ε|^power``.
-
-    Parameters
-    ----------
-    name
-        In words.
-    power
-        Exponent of |ε|.
-    root
-        Root of the imperfection in whose powers the series proceeds.
-    both_signs
-        Whether the load changes in the same way for both signs of ε, in the leading order; None if
-        only one sign limits the load, or has to.
     """
 
     name: str
+    """In words."""
     power: float
+    """Exponent of |ε|."""
     root: int
+    """Root of the imperfection in whose powers the series proceeds."""
     both_signs: bool | None
+    """Whether the load changes in the same way for both signs of ε, in the leading order; None if
+    only one sign limits the load, or has to."""
 
 
 LAWS = (

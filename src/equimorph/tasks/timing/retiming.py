@@ -30,24 +30,16 @@ NEGLIGIBLE = 1e-12
 
 @dataclass(frozen=True, eq=False)
 class FilteredMotion:
-    """A polyline in time, averaged over windows of time.
-
-    Parameters
-    ----------
-    corners
-        Parameters at the corners.
-    durations
-        Time of each leg, without the averages.
-    pauses
-        Time at rest at each corner, 0 at the first and last.
-    windows
-        Times of the moving averages: none, one (accelerations) or two (jerks).
-    """
+    """A polyline in time, averaged over windows of time."""
 
     corners: Rows
+    """Parameters at the corners."""
     durations: Float[np.ndarray, " legs"]
+    """Time of each leg, without the averages."""
     pauses: Float[np.ndarray, " corners"]
+    """Time at rest at each corner, 0 at the first and last."""
     windows: tuple[float, ...]
+    """Times of the moving averages: none, one (accelerations) or two (jerks)."""
 
     @cached_property
     def _rates(self) -> tuple[Instants, Float[np.ndarray, "changes parameters"]]:

@@ -24,24 +24,16 @@ def enclose(structure: Structure, z: Interval, p: Interval) -> Enclosed:
 
 @dataclass(frozen=True)
 class Deviation:
-    """Change ``x G`` of F by an error of data, |x| ≤ 1: F is linear in x.
-
-    Parameters
-    ----------
-    nominal
-        The structure without errors.
-    changed
-        The one at x = 1: G is the difference of their F.
-    far
-        One at a large x, from which bounds of G and its derivatives are narrow.
-    multiple
-        That x.
-    """
+    """Change ``x G`` of F by an error of data, |x| ≤ 1: F is linear in x."""
 
     nominal: Structure
+    """The structure without errors."""
     changed: Structure
+    """The one at x = 1: G is the difference of their F."""
     far: Structure
+    """One at a large x, from which bounds of G and its derivatives are narrow."""
     multiple: float
+    """That x."""
 
     def force(self, z: Lanes, p: Parameters) -> Lanes:
         """G."""
@@ -63,18 +55,12 @@ class Deviation:
 
 @dataclass(frozen=True)
 class ErrorBox(Columns):
-    """Errors of the parameters, which may differ from segment to segment, and of data.
-
-    Parameters
-    ----------
-    steps
-        Changes of all parameters by each error.
-    deviations
-        Errors of data.
-    """
+    """Errors of the parameters, which may differ from segment to segment, and of data."""
 
     steps: Float[np.ndarray, "lanes m parameters"]
+    """Changes of all parameters by each error."""
     deviations: tuple[Deviation, ...] = ()
+    """Errors of data."""
 
     @classmethod
     def none(cls, states: States) -> "ErrorBox":

@@ -40,33 +40,22 @@ SHARES = (0.95, 0.9, 0.8, 0.6, 0.4, 0.2)
 
 @dataclass(frozen=True)
 class Bounds(Columns):
-    """What is known of segments.
-
-    Parameters
-    ----------
-    proved
-        Whether one equilibrium exists and is unique near every point of the chord.
-    error
-        Largest distance r of the equilibria from the chord, in multiples of the weights.
-    unique
-        Distance within which they are the only ones.
-    at_ends
-        Distance of the equilibria from the given states at both ends.
-    stable
-        Whether the index is 0 all along.
-    weights
-        s: entry by entry, z lies within r s of the chord.
-    margin
-        Stability margin that is kept all along, 0 if none was proved.
-    """
+    """What is known of segments."""
 
     proved: Flags
+    """Whether one equilibrium exists and is unique near every point of the chord."""
     error: Values
+    """Largest distance r of the equilibria from the chord, in multiples of the weights."""
     unique: Values
+    """Distance within which they are the only ones."""
     at_ends: Float[np.ndarray, "lanes 2"]
+    """Distance of the equilibria from the given states at both ends."""
     stable: Flags
+    """Whether the index is 0 all along."""
     weights: Lanes
+    """s: entry by entry, z lies within r s of the chord."""
     margin: Values
+    """Stability margin that is kept all along, 0 if none was proved."""
 
 
 def segment_bounds(

@@ -39,24 +39,16 @@ AT_GOAL = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class LiftedPolyline:
-    """Exact states along a polyline, and how the way ended.
-
-    Parameters
-    ----------
-    states
-        All points in order: corners, and those where the lifts stopped between them.
-    at
-        Number of the leg + share of it, per state.
-    corners
-        Which states are the corners that were reached.
-    end
-        The last event: "arrived", or what ended the way.
-    """
+    """Exact states along a polyline, and how the way ended."""
 
     states: States
+    """All points in order: corners, and those where the lifts stopped between them."""
     at: Float[np.ndarray, " points"]
+    """Number of the leg + share of it, per state."""
     corners: Int[np.ndarray, " corners"]
+    """Which states are the corners that were reached."""
     end: Event
+    """The last event: "arrived", or what ended the way."""
 
 
 def follow_polyline(

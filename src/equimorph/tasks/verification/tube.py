@@ -52,23 +52,17 @@ Corners = Float[np.ndarray, "cells axes"]
 
 @dataclass(frozen=True)
 class Cells(Columns):
-    """Cells of a tube.
-
-    Parameters
-    ----------
-    before, after, start, end
-        Unknowns and parameters at both ends of the segment, at the middle of the box.
-    lower, upper
-        Of the cell: place along the route, in segments, then the errors of parameters in units of
-        their half widths.
-    """
+    """Cells of a tube."""
 
     before: Lanes
     after: Lanes
     start: Parameters
     end: Parameters
+    """Unknowns and parameters at both ends of the segment, at the middle of the box."""
     lower: Corners
     upper: Corners
+    """Of the cell: place along the route, in segments, then the errors of parameters in units of
+    their half widths."""
 
     @property
     def middle(self) -> Corners:
