@@ -15,17 +15,18 @@ def lowest_of(energy):
         return em.reduce(eset, prefer=em.charts.lowest(eset.structure.descriptor("energy")))
 
 
-@pytest.mark.parametrize(("seed", "lost"), [(3, 0), (5, 0), (12, 2), (30, 0)])
-def test_barriers_of_least_energy_are_ties_up_to_the_cusp(seed, lost):
+@pytest.mark.parametrize("seed", [3, 5, 12, 28, 30, pytest.param(45, marks=pytest.mark.slow)])
+def test_barriers_of_least_energy_are_ties_up_to_the_cusp(seed):
     """Where a chord of the mesh passed a cusp on its wrong side, a sliver of a fold was preferred.
 
     Barriers named "fold" stood there, and states beside them were not those of least energy. Of
-    seed 12 two edges lead over the wrong side of the cusp to a fold: their ends count as lost.
+    seeds 12 and 28 edges led over the wrong side of the cusp to a fold: their ends were lost. In 45
+    one fold leads two edges on to the cusp, over another vertex. Seeds 0 to 59 lose none.
     """
     energy = random_energy(seed)
     chart = lowest_of(energy)
     assert [barrier.kind for barrier in chart.barriers] == ["tie"]
-    assert chart.lost == lost
+    assert chart.lost == 0
     (barrier,) = chart.barriers
     for point in barrier.points[barrier.jump > 0.01]:
         low, high = np.sort(minima(energy, point)[1])[:2]

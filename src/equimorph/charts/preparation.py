@@ -5,7 +5,19 @@ from itertools import pairwise
 
 import numpy as np
 
-from equimorph.arrays import Bool, Facets, Float, Int, ItemFlags, Items, Pairs, Some, VertexNumbers
+from equimorph.arrays import (
+    Bool,
+    Facets,
+    Float,
+    Int,
+    ItemFlags,
+    Items,
+    ItemValues,
+    Pairs,
+    Some,
+    VertexFlags,
+    VertexNumbers,
+)
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.complex.excerpts import Excerpt, excerpt_of
 from equimorph.manifold.complex.kept_tables import from_cache, kept
@@ -13,6 +25,7 @@ from equimorph.manifold.complex.marked_complex import Fabric
 from equimorph.manifold.complex.vertices import Vertices
 from equimorph.manifold.geometry.points import VertexKind, on_fold
 from equimorph.manifold.geometry.simplices import volumes
+from equimorph.manifold.geometry.tangents import fold_forms
 from equimorph.manifold.geometry.topology import (
     Adjacency,
     adjacency,
@@ -118,9 +131,22 @@ def _with_cusps(eset: EquilibriumSet) -> EquilibriumSet | None:
     # straight sides of cells at a cusp may pass it on its wrong side
     whole = whole_set(excerpt.put_back(fabric))
     fixed = facets_of((*whole.folds, *whole.crossings), 2)
-    links = whole.adjacency
-    cells = flip_inverted_triangles(whole.cells, whole.coordinates, fixed, whole.stratum, links)
+    ground = _Ground(whole.coordinates, on_fold(whole.kinds), _existence(whole, len(cusps)))
+    cells = _flip(whole.cells, ground, fixed, whole.stratum, whole.adjacency)
     return replace(whole, cells=cells)
+
+
+def _existence(eset: EquilibriumSet, cusps: int) -> Float[np.ndarray, "V 2"]:
+    """Vectors at vertices on folds towards where states exist; none elsewhere.
+
+    The last vertices are cusps, and have none.
+    """
+    out = np.zeros((len(eset.points), len(eset.names)))
+    own = on_fold(eset.kinds)
+    own[len(own) - cusps :] = False
+    forms = fold_forms(eset.setting, eset.points.z[own], eset.points.p[own])
+    out[own] = forms.existence / eset.setting.scales
+    return out
 
 
 def flip_inverted_triangles(
@@ -148,6 +174,50 @@ def flip_inverted_triangles(
     whole
         Which triangles share edges.
     """
+    plain = _Ground(places, np.zeros(len(places), bool), np.zeros_like(places))
+    return _flip(corners, plain, fixed, sheet, whole)
+
+
+@dataclass(frozen=True)
+class _Ground:
+    """Places of vertices in the plane, which lie on folds, and from there to where states exist.
+
+    An edge from a fold to where the states that meet there do not exist passes a cusp on its wrong
+    side, though no triangle overlaps another one.
+    """
+
+    places: Float[np.ndarray, "V 2"]
+    folded: VertexFlags
+    existence: Float[np.ndarray, "V 2"]
+
+    def areas(self, corners: Int[np.ndarray, "n 3"]) -> ItemValues:
+        """Signed areas of triangles."""
+        return volumes(self.places[corners])
+
+    def astray(self, one: Items, other: Items) -> ItemFlags:
+        """Which edges between vertices pass a cusp on its wrong side."""
+        way = self.places[other] - self.places[one]
+        ahead, back = (np.einsum("nk,nk->n", way, self.existence[each]) for each in (one, other))
+        out, into = self.folded[one], self.folded[other]
+        return np.asarray((out & ~into & (ahead < 0.0)) | (into & ~out & (back > 0.0)))
+
+    def bad(self, corners: Int[np.ndarray, "n 3"]) -> ItemFlags:
+        """Triangles that are turned over, or that have such an edge."""
+        out = self.areas(corners) < 0.0
+        some = np.flatnonzero(count_corners(self.folded, corners))
+        out[some] |= np.any([self.astray(*corners[some][:, k].T) for k in OPPOSITE], axis=0)
+        return out
+
+
+def _flip(
+    corners: Int[np.ndarray, "C 3"],
+    ground: _Ground,
+    fixed: Pairs,
+    sheet: Int[np.ndarray, " C"],
+    whole: Adjacency,
+) -> Int[np.ndarray, "C 3"]:
+    """Flip edges so that fewer triangles are bad; see `flip_inverted_triangles` and `_Ground`."""
+    places = ground.places
     (a, b), base = whole.links.T, len(places)
     apart = np.zeros(len(whole.facets), bool)
     apart[whole.across[sheet[a] != sheet[b]]] = True
@@ -157,14 +227,14 @@ def flip_inverted_triangles(
     turned = signs * np.sign(np.bincount(sheet, area))[sheet] < 0
     out[turned] = out[turned][:, ::-1]
     kept, outer = keys_of(fixed, base), keys_of(whole.facets[apart], base)
-    area = volumes(places[out])
+    area, bad = ground.areas(out), ground.bad(out)
     for _ in range(ROUNDS):
-        bad = np.flatnonzero(area < 0.0)
-        bad = bad[np.argsort(area[bad], kind="stable")]
-        flipped = _flip_once(out, places, bad, kept, outer) if len(bad) else []
+        some = np.flatnonzero(bad)
+        some = some[np.argsort(area[some], kind="stable")]
+        flipped = _flip_once(out, ground, some, kept, outer) if len(some) else []
         if not flipped:
             break
-        area[flipped] = volumes(places[out[flipped]])
+        area[flipped], bad[flipped] = ground.areas(out[flipped]), ground.bad(out[flipped])
     return out
 
 
@@ -176,18 +246,19 @@ def _without(whole: Adjacency, apart: Bool[np.ndarray, " F"]) -> Adjacency:
 
 def _flip_once(
     corners: Int[np.ndarray, "C 3"],
-    places: Float[np.ndarray, "V 2"],
+    ground: _Ground,
     bad: Items,
     kept: Int[np.ndarray, " kept"],
     outer: Int[np.ndarray, " outer"],
 ) -> list[int]:
     """Flip an edge of each bad triangle where that helps; changes `corners`. Return the flipped."""
-    base, near = len(places), np.zeros(len(places), bool)
+    base = len(ground.places)
+    near = np.zeros(base, bool)
     near[corners[bad]] = True
     cells = np.flatnonzero(count_corners(near, corners))
     keys = np.concatenate([keys_of(corners[cells][:, k], base) for k in OPPOSITE])
     around = _Around(keys, np.tile(cells, 3)).without(outer)
-    cell, other, *new = _best_flips(corners, places, bad, around, kept)
+    cell, other, *new = _best_flips(corners, ground, bad, around, kept)
     # their neighbours are computed again in the next round
     sides = np.stack(new, axis=1)[:, :, OPPOSITE].reshape(-1, 2)
     of_side, neighbours = around.beside(keys_of(sides, base))
@@ -231,13 +302,13 @@ class _Around:
 
 def _best_flips(
     corners: Int[np.ndarray, "C 3"],
-    places: Float[np.ndarray, "V 2"],
+    ground: _Ground,
     bad: Items,
     around: _Around,
     kept: Int[np.ndarray, " kept"],
 ) -> tuple[Some, Some, Int[np.ndarray, "some 3"], Int[np.ndarray, "some 3"]]:
     """Bad triangles, neighbours with which to flip them, and both new triangles."""
-    base, before = len(places), volumes(places[corners[bad]])
+    base, before = len(ground.places), ground.areas(corners[bad])
     worst, other = np.full(len(bad), -np.inf), np.full(len(bad), -1)
     new = np.zeros((2, len(bad), 3), int)
     for k, opposite in enumerate(OPPOSITE):
@@ -246,9 +317,14 @@ def _best_flips(
         c, a, b = corners[bad[own, None], [k, *opposite]].T
         d = corners[beside].sum(axis=1) - a - b
         pair = np.array([[a, d, c], [d, b, c]]).transpose(0, 2, 1)
-        least = np.minimum(*(volumes(places[each]) for each in pair))
-        good = least > np.minimum(before[own], volumes(places[corners[beside]]))
-        good = np.flatnonzero(good & (least > worst[own]))
+        least = np.minimum(*(ground.areas(each) for each in pair))
+        area = np.minimum(before[own], ground.areas(corners[beside]))
+        old, later = ground.astray(a, b), ground.astray(c, d)
+        # edges that are handed to the next vertex of the fold may turn triangles over for a while
+        handed = old & ~later & (ground.folded[c] != ground.folded[d])
+        least[handed] = np.inf
+        good = (area < 0.0) & (least > area) & (old | ~later)
+        good = np.flatnonzero((good | handed) & (least > worst[own]))
         own = own[good]
         worst[own], other[own], new[:, own] = least[good], beside[good], pair[:, good]
     some = np.flatnonzero(other >= 0)
