@@ -192,10 +192,7 @@ def _array(annotation: Any, _: str) -> Kind:
 def as_array(value: Any, numeric: str = "iuf") -> np.ndarray:
     """Array of numbers; texts, complex numbers and truth values are none.
 
-    Raises
-    ------
-    TypeError, ValueError
-        For anything else, and lists of unlike lengths.
+    Raises `TypeError` or `ValueError` for anything else, and lists of unlike lengths.
     """
     if isinstance(value, str | Mapping):
         raise TypeError

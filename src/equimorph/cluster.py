@@ -95,12 +95,8 @@ class DaskWorkers:
     ) -> Generator[Any, None, None]:
         """Return the results of a function on chunks, in their order, as soon as they are there.
 
-        Raises
-        ------
-        InputError
-            If a worker has other versions of what computes than this process.
-        LostWorkersError
-            If the workers that computed a chunk were lost too often.
+        Raises `InputError` if a worker has other versions of what computes than this process.
+        Raises `LostWorkersError` if the workers that computed a chunk were lost too often.
         """
         lost = load_package("distributed", "cluster", "cluster.dask").KilledWorker
         begun = (self._begin(function, k, each) for k, each in enumerate(chunks))
@@ -179,16 +175,9 @@ def versions() -> dict[str, str]:
 def connect(text: str) -> Generator[Workers]:
     """Give the workers of a cluster while a block lasts.
 
-    Parameters
-    ----------
-    text
-        ``local`` or ``local:n`` for processes on this machine, one for each processor unless a
-        number is given, or the address of a scheduler, like ``tcp://host:8786``.
-
-    Raises
-    ------
-    InputError
-        If it is neither, or nobody answers at the address.
+    `text`: ``local`` or ``local:n`` for processes on this machine, one for each processor unless a
+    number is given, or the address of a scheduler, like ``tcp://host:8786``. Raises `InputError` if
+    it is neither, or nobody answers at the address.
     """
     found = ADDRESS.fullmatch(text)
     if not found:

@@ -34,9 +34,7 @@ def outline(
     Edges between neighbours that lie side by side cancel. Flat triangles cover nothing, overturned
     ones cover minus one time.
 
-    Returns
-    -------
-    Vertex pairs, and for each the count on its left less the count on its right.
+    Returns vertex pairs, and for each the count on its left less the count on its right.
     """
     a, b, c = (coordinates[cells[:, k]] for k in range(3))
     turn = cross(b - a, c - a)

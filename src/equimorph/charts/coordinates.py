@@ -58,10 +58,7 @@ def solve_over_parameters(
 ) -> Settled:
     """States by Newton in those free parameters that are not given: quick, and singular at folds.
 
-    Parameters
-    ----------
-    tried
-        Numbers of the lanes for which it is tried.
+    `tried`: numbers of the lanes for which it is tried.
     """
     setting, structure = scalars.setting, scalars.setting.structure
     given, asked = scalars.places >= 0, np.flatnonzero(scalars.places < 0)

@@ -106,9 +106,7 @@ def empty_regions(
 ) -> list[list[Float[np.ndarray, "_ 2"]]]:
     """Connected parts of a box over which there is no equilibrium.
 
-    Returns
-    -------
-    For each part its outline, counter-clockwise, and then its holes, clockwise.
+    Returns for each part its outline, counter-clockwise, and then its holes, clockwise.
     """
     covered = regions.levels[0] if regions.levels else ()
     frame = _frame(covered, lower, upper)
@@ -161,12 +159,8 @@ def regions_within(
 ) -> Regions:
     """Exact regions of the plane between closed curves, by how often these wind around them.
 
-    Parameters
-    ----------
-    coordinates
-        Places of the ends of edges.
-    edges, jump
-        Directed edges, and the count on their left less that on their right.
+    `coordinates`: places of the ends of edges. `edges`, `jump`: directed edges, and the count on
+    their left less that on their right.
     """
     none = np.empty(0, int)
     nothing = Regions((), np.empty((0, 2)), np.empty((0, 2), int), none, none)

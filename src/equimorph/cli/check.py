@@ -17,10 +17,7 @@ from equimorph.tasks.maps.actuator_map import unloaded_base
 def check_and_show(file: Path, *, as_json: bool = False) -> int:
     """Check a study, then show what running it would compute, as text or as data for programs.
 
-    Raises
-    ------
-    StudyError
-        With a line for each mistake of the study.
+    Raises `StudyError` with a line for each mistake of the study.
     """
     output = Output(as_json=as_json)
     _, study, problem = read_problem(file)

@@ -230,10 +230,7 @@ class CosseratPlant(Plant):
     def step(self) -> None:
         """One step in time, in as many of PyElastica as its fastest waves need.
 
-        Raises
-        ------
-        ArithmeticError
-            If the simulation has diverged.
+        Raises `ArithmeticError` if the simulation has diverged.
         """
         self._grips.move(self._y, self._time, self._step)
         time, step = np.float64(self._time), np.float64(self._step / self._substeps)

@@ -74,10 +74,8 @@ class LinkageModel(Model):
     def begin(self, start: State) -> Balance:
         """The chain's equilibrium at the start.
 
-        Raises
-        ------
-        ArithmeticError
-            If there is none: the start is too close to a fold for this number of links.
+        Raises `ArithmeticError` if there is none: the start is too close to a fold for this number
+        of links.
         """
         found = self.balance(start)
         if found is None or found.least <= 0.0:

@@ -139,10 +139,7 @@ class OwnPlant(DirectPlant):
     def step(self) -> None:
         """One step in time.
 
-        Raises
-        ------
-        ArithmeticError
-            If Newton's method does not converge.
+        Raises `ArithmeticError` if Newton's method does not converge.
         """
         rate = self._difference(self.p, self._rows)
         drive = rate[None], self._difference(rate, self._rates)[None]

@@ -111,10 +111,7 @@ def holding_stiffness(holding: Holding) -> float:
 def time_of(rod: Rod | SpatialRod) -> float:
     """T = √(m L/λ_cr) in the rod's unit of time.
 
-    Raises
-    ------
-    MissingError
-        For a rod with units and without a mass.
+    Raises `MissingError` for a rod with units and without a mass.
     """
     unit = rod.units.time()
     if unit is None:

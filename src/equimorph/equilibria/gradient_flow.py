@@ -146,9 +146,7 @@ def implicit_step(
     is positive definite, u⁺ is its minimum, so that the energy falls by ``‖u⁺ − u‖²/(2h)`` at least
     if u obeys the constraints.
 
-    Returns
-    -------
-    Points, and where Newton converged with a positive definite Hessian.
+    Returns points, and where Newton converged with a positive definite Hessian.
     """
     n, new = structure.unknowns, z.copy() if guess is None else guess.copy()
     solved, todo = np.zeros(len(z), bool), np.arange(len(z))

@@ -110,12 +110,8 @@ def hidden_events(curve: Curve, points: Points, options: TraceOptions) -> Events
     An eigenvalue that touches zero is one event that leaves the index as it is; one that crosses
     zero twice between two points gives two events.
 
-    Parameters
-    ----------
-    curve
-        The curves of all lanes.
-    points
-        Their points, from the start on, sorted by lane and length.
+    `curve`: the curves of all lanes. `points`: their points, from the start on, sorted by lane and
+    length.
     """
     if len(points.t) < 2:
         return Events.join([], curve.structure.size)
@@ -181,12 +177,8 @@ def with_multiple_points(
     or it ends as at a fold if their number is odd. The inertia of F_z ∓ εM counts the eigenvalues
     within ±ε. A fold with another small eigenvalue is located so well that one vanishes alone.
 
-    Parameters
-    ----------
-    curve, start
-        Curves and unknowns at their beginning, one per lane.
-    outcome
-        How the lanes ended.
+    `curve`, `start`: curves and unknowns at their beginning, one per lane. `outcome`: how the lanes
+    ended.
     """
     ended = np.flatnonzero(np.isin(outcome.code, (EventCode.LOST, EventCode.FOLD)))
     if len(ended) == 0 or not curve.folds_change_index:

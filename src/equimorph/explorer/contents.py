@@ -86,10 +86,7 @@ def study_text(eset: EquilibriumSet, title: str) -> str:
 def toml(value: Any) -> str:
     """A value as TOML on one line.
 
-    Raises
-    ------
-    InputError
-        For what TOML has no form for.
+    Raises `InputError` for what TOML has no form for.
 
     Examples
     --------

@@ -33,14 +33,9 @@ def pack(arrays: Mapping[str, Num[np.ndarray, "..."]]) -> tuple[list[dict[str, A
     column by itself, and all numbers byte by byte (all first bytes, then all second ones), which
     compresses best.
 
-    Parameters
-    ----------
-    arrays
-        By name, with one or two axes, of 8 or 16 bits without sign, of 32 bits, or single floats.
-
-    Returns
-    -------
-    Name, kind, rows and columns of each, in the order of the bytes; the bytes as text.
+    `arrays`: by name, with one or two axes, of 8 or 16 bits without sign, of 32 bits, or single
+    floats. Returns name, kind, rows and columns of each, in the order of the bytes; the bytes as
+    text.
     """
     directory: list[dict[str, Any]] = []
     chunks = []

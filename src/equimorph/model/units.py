@@ -85,10 +85,7 @@ def read_unit(text: str, known: Mapping[str, Unit], what: str) -> Unit:
 def in_unit(text: str, unit: str, what: str) -> float:
     """Number of a text like "0.5 N m" in a unit.
 
-    Raises
-    ------
-    InputError
-        For a text without number, or units that measure something else.
+    Raises `InputError` for a text without number, or units that measure something else.
 
     Examples
     --------

@@ -98,10 +98,7 @@ def write_chart(group: h5py.Group, chart: Chart | Atlas) -> None:
 def read_chart(group: h5py.Group, owner: Owner) -> Chart | Atlas:
     """Read what `write_chart` wrote.
 
-    Raises
-    ------
-    ValueError
-        If the parts do not belong together.
+    Raises `ValueError` if the parts do not belong together.
     """
     about = get_json(group, ABOUT)
     eset = read_set(group[SET], owner)

@@ -121,17 +121,8 @@ def lock_file(path: Path, what: str) -> Generator[None]:
     The file stays where it is and names its last holder. There is no stale lock: the system
     releases it with the process, however that ends.
 
-    Parameters
-    ----------
-    path
-        The file; made if it does not exist.
-    what
-        What is being locked, for the message.
-
-    Raises
-    ------
-    InputError
-        If another process, or another place in this one, holds the lock.
+    `path`: the file; made if it does not exist. `what`: what is being locked, for the message.
+    Raises `InputError` if another process, or another place in this one, holds the lock.
     """
     handle = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
     try:

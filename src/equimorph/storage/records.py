@@ -102,10 +102,7 @@ def read_record(group: h5py.Group, owner: Owner, schema: str = RECORD) -> Any:
 
     `schema` is that of groups that name none, as the first releases wrote them.
 
-    Raises
-    ------
-    UnreadableError
-        If this release cannot read this record.
+    Raises `UnreadableError` if this release cannot read this record.
     """
     name = group.attrs.get(SCHEMA, group.attrs.get(KIND, schema))
     version = int(group.attrs.get(SCHEMA_VERSION, 1))

@@ -96,10 +96,8 @@ class Schema:
     def build(self, version: int, values: Mapping[str, Any]) -> Any:
         """Return the record that has values, as a version of this schema names them.
 
-        Raises
-        ------
-        UnreadableError
-            If this release does not know the version or one of the fields, or lacks one.
+        Raises `UnreadableError` if this release does not know the version or one of the fields, or
+        lacks one.
         """
         change = self.change
         here = {change.renamed.get(name, name): value for name, value in values.items()
@@ -126,10 +124,7 @@ def schema_of(record: Any) -> Schema | None:
 def find_schema(name: str) -> Schema:
     """Return the schema that a file names.
 
-    Raises
-    ------
-    UnreadableError
-        If this release has none.
+    Raises `UnreadableError` if this release has none.
     """
     if name not in schemas():
         raise UnreadableError(

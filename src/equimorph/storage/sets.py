@@ -76,12 +76,8 @@ def write_set(group: h5py.Group, eset: EquilibriumSet, height: Descriptor | None
 def read_set(group: h5py.Group, owner: Owner) -> EquilibriumSet:
     """Read what `write_set` wrote.
 
-    Raises
-    ------
-    ValueError
-        If the parts do not belong together.
-    InputError
-        If the states are no equilibria of the structure.
+    Raises `ValueError` if the parts do not belong together. Raises `InputError` if the states are
+    no equilibria of the structure.
     """
     about = get_json(group, ABOUT)
     d = len(about["box"])

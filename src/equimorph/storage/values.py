@@ -63,10 +63,7 @@ def write_value(group: h5py.Group, value: Any) -> None:
 def read_value(group: h5py.Group, owner: Owner) -> Any:
     """Read what `write_value` wrote.
 
-    Raises
-    ------
-    UnreadableError
-        If it holds a record that this release cannot read.
+    Raises `UnreadableError` if it holds a record that this release cannot read.
     """
     return _decode(group, owner, get_json(group, ABOUT))
 

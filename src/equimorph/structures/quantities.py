@@ -185,10 +185,7 @@ def find_descriptor(structure: Structure, text: str) -> Descriptor:
     ``distance(room(x, y, r))``, ``outside(Theta 1 to 2, Delta 0 to 1)`` and, of the drawn shape,
     ``shape_y(0.3)``.
 
-    Raises
-    ------
-    InputError
-        If it means nothing here.
+    Raises `InputError` if it means nothing here.
 
     Examples
     --------

@@ -29,16 +29,9 @@ def turn_of_element(degree: int, smallest_wave: float) -> float:
     The coefficient n of A sin(2xt), −1/2 ≤ t ≤ 1/2, in Legendre polynomials is at most
     ``A xⁿ/(2n − 1)!!``, the first term of ``A (2n + 1) jₙ(x)``; κh = 2Ax.
 
-    Parameters
-    ----------
-    degree
-        Of the polynomials in an element; of its two highest coefficients the lower one is larger.
-    smallest_wave
-        Smallest amplitude A in radians of waves with this curvature.
-
-    Returns
-    -------
-    The turn in radians.
+    `degree`: of the polynomials in an element; of its two highest coefficients the lower one is
+    larger. `smallest_wave`: smallest amplitude A in radians of waves with this curvature. Returns
+    the turn in radians.
     """
     n = degree - 1
     x = (TAIL * prod(range(1, 2 * n, 2)) / smallest_wave) ** (1.0 / n)

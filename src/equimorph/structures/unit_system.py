@@ -189,10 +189,7 @@ class UnitSystem:
 def kilograms(given: Any, what: str) -> float:
     """Mass in kilograms of a number of these, or of a text with a unit of mass.
 
-    Raises
-    ------
-    InputError
-        For a text with other units.
+    Raises `InputError` for a text with other units.
 
     Examples
     --------

@@ -44,10 +44,7 @@ class Comparison:
 def parse_comparison(text: str) -> Comparison:
     """Read ``descriptor <= number`` or ``descriptor >= number``, with or without a unit.
 
-    Raises
-    ------
-    InputError
-        If `text` has another form.
+    Raises `InputError` if `text` has another form.
 
     Examples
     --------

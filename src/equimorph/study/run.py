@@ -60,17 +60,8 @@ class Checkpoints:
         The answer is always the one read from the file, so that a run that was interrupted goes on
         from the very numbers that it would have had.
 
-        Parameters
-        ----------
-        question
-            All that the answer depends on, as plain data.
-        compute
-            Finds the answer.
-
-        Raises
-        ------
-        InputError
-            If the folder cannot be written.
+        `question`: all that the answer depends on, as plain data. `compute`: finds the answer.
+        Raises `InputError` if the folder cannot be written.
         """
         key = fingerprint(question)
         self.asked.add(key)

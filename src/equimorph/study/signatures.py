@@ -189,10 +189,7 @@ def arguments_of(
     `names` are keys of arguments that are called otherwise in studies; no key gives those left out.
     `natural`: whether states come from natural ones instead of the set.
 
-    Raises
-    ------
-    TypeError
-        For a parameter of a type that a study cannot write.
+    Raises `TypeError` for a parameter of a type that a study cannot write.
     """
     parameters = inspect.signature(task).parameters
     forms = {name: Form(name, alternatives(each.annotation)) for name, each in parameters.items()}

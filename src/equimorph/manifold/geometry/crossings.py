@@ -81,14 +81,8 @@ def reduction(
 def crossing_frames(setting: Setting, z: Lanes, p: Parameters, rows: Rows) -> tuple[Frames, Slopes]:
     """Orthonormal bases of the tangent spaces of sheets at their crossings.
 
-    Parameters
-    ----------
-    rows
-        Bases of nearby spaces; they select one of the two sheets, and its orientation.
-
-    Returns
-    -------
-    The bases, and the slope along them of what vanishes on the other sheet, of unit length.
+    `rows`: bases of nearby spaces; they select one of the two sheets, and its orientation. Returns
+    the bases, and the slope along them of what vanishes on the other sheet, of unit length.
     """
     kernel, hessian = _kernel(setting, z, p)
     near = np.einsum("ldc,lkc->ldk", rows, frames_in_embedding(setting, kernel))

@@ -55,12 +55,7 @@ def pin_in_cells(
     and a fold does not leave the cell. Folds may bulge beyond a face between edges that they do not
     meet, and behind cusps: if none of their points is inside, the one least far outside is taken.
 
-    Parameters
-    ----------
-    groups, kind, span
-        As in `pin`.
-    frames
-        Corners of the grid cells, in free parameters.
+    `groups`, `kind`, `span`: as in `pin`. `frames`: corners of the grid cells, in free parameters.
     """
     sizes = np.array([len(group) for group in groups], int)
     z, p, _ = middles(setting, points, groups)

@@ -63,13 +63,9 @@ class Pattern:
 def pattern_of(codes: tuple[int, ...], is_open: bool) -> Pattern | None:
     """Pattern of polygons; None where it is not certain, where sheets cross, or points are missing.
 
-    Parameters
-    ----------
-    codes
-        ``(index * KINDS + kind) * SIDES + sides`` of each point, with `kind` one of `REGULAR`,
-        `TURN`, `MEETING`, and `sides` as in `Plan`.
-    is_open
-        Whether a constraint closes it from the last point to the first.
+    `codes`: ``(index * KINDS + kind) * SIDES + sides`` of each point, with `kind` one of `REGULAR`,
+    `TURN`, `MEETING`, and `sides` as in `Plan`. `is_open`: whether a constraint closes it from the
+    last point to the first.
     """
     sides = tuple(code % SIDES for code in codes)
     kinds = [code // SIDES % KINDS for code in codes]

@@ -70,13 +70,8 @@ class CellIndex:
     ) -> "CellIndex":
         """Index of cells.
 
-        Parameters
-        ----------
-        corners
-            Corners of the cells.
-        overhang
-            How far beyond each cell, or across the facet opposite to each corner, a point may lie
-            to be found near it, in barycentric coordinates.
+        `corners`: corners of the cells. `overhang`: how far beyond each cell, or across the facet
+        opposite to each corner, a point may lie to be found near it, in barycentric coordinates.
         """
         d = corners.shape[2]
         # one coordinate of one corner a row: rows of few numbers are slow to reduce

@@ -91,12 +91,8 @@ def support_energy(
     compliances c: ``−(λ + F) x − ½ c_A λ² − ½ c_B (λ + F)²``, end A at ``−c_A λ``, end B at
     ``x + c_B (λ + F)``. Without opposed supports λ is −F or 0.
 
-    Parameters
-    ----------
-    forces
-        Total force of all loads as a combination of the scalars; multipliers come first in these.
-    place
-        Scalars of the parameters by name.
+    `forces`: total force of all loads as a combination of the scalars; multipliers come first in
+    these. `place`: scalars of the parameters by name.
     """
     count, multiplier = len(forces), 0
     quadratic = np.zeros((count, count))

@@ -218,16 +218,8 @@ def closing(moves: tuple[Sequence[int], Sequence[int]], slide: float) -> Float[n
     ``−p (V ± ½ X Y)`` with the chord's components along and across the line of the slide: plus if A
     moves along or B across, minus the other way round.
 
-    Parameters
-    ----------
-    moves
-        For A and for B the axis along which it moves, 0 along and 1 across; empty if held.
-    slide
-        Angle of the first axis from x, in radians.
-
-    Returns
-    -------
-    Zero if both are held.
+    `moves`: for A and for B the axis along which it moves, 0 along and 1 across; empty if held.
+    `slide`: angle of the first axis from x, in radians. Returns zero if both are held.
     """
     first, last = moves
     sign = 0.0

@@ -231,9 +231,7 @@ def polylines(
     Within a cell the closest points on different edges are connected first, in pairs;
     unpaired points are ends of curves.
 
-    Returns
-    -------
-    Numbers of the points along each polyline; a closed one repeats its first.
+    Returns numbers of the points along each polyline; a closed one repeats its first.
     """
     inside: dict[int, list[int]] = {}
     for k, cells in enumerate(cells_beside(edge, shape).tolist()):
