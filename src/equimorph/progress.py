@@ -121,7 +121,6 @@ class _Cell:
 
     def show(self, reached: dict[str, Reached], stage: str) -> None:
         """Draw all bars, not too often."""
-        del stage
         self._html = table_of(reached)
         if time.monotonic() - self._time > EVERY:
             self._draw()

@@ -135,7 +135,6 @@ class _Cause(Columns):
 
 def _same(tests: tuple[Test, ...], lanes: Some) -> tuple[Test, ...]:
     """The same tests of all lanes."""
-    del lanes
     return tests
 
 

@@ -251,7 +251,6 @@ class _Crossings:
         self, fabric: Fabric, ends: Ends, mark: int, index: Items, known: Float[np.ndarray, "n 2"]
     ) -> tuple[ItemFlags, Vertices]:
         """Those on some edges; see `cut_between`."""
-        del fabric, mark, index, known
         wanted = keys_of(ends, self._base)
         done = np.isin(wanted, self._keys) & (ends < self._base).all(axis=1)
         order = np.argsort(self._keys)

@@ -69,7 +69,6 @@ class _Least(Rule):
         score = self.score(eset)
 
         def choose(found: Found, points: Points) -> Bool[np.ndarray, " found"]:
-            del points
             return first_of_each(found, score(found), eset.structure.elevation)
 
         return Choice(choose, score)

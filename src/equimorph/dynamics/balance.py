@@ -239,7 +239,6 @@ class FoldDelay:
             return [velocity, force / self.inertia]
 
         def left(t: float, state: Any) -> float:
-            del t
             return float(state[0] - far)
 
         left.terminal = True  # type: ignore[attr-defined]  # how solve_ivp takes it

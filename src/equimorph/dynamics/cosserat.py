@@ -204,7 +204,6 @@ class CosseratPlant(Plant):
             """Dead forces on the elements, half on each of their nodes."""
 
             def apply_forces(self, system: Any, time: Any = 0.0) -> None:
-                del time
                 half = 0.5 * plant._forces.T
                 system.external_forces[:2, :-1] += half
                 system.external_forces[:2, 1:] += half

@@ -77,9 +77,6 @@ class Simulation(ABC):
         return float(np.abs(self.data.qvel).max(initial=0.0))
 
 
-Angles = Float[np.ndarray, " bodies"]
-
-
 @dataclass(frozen=True, eq=False)
 class _Drive:
     """Numbers of the model, or loads, that are a table times the settings."""

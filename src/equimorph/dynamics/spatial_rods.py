@@ -150,7 +150,6 @@ class SpatialPlant(Simulation):
 
     def entries(self, qpos: Float[np.ndarray, " joints"], y: Settings) -> Vector:
         """Entries of the chain: all joints of the simulation."""
-        del y
         return qpos.copy()
 
     @property

@@ -104,7 +104,6 @@ class PlainCurve(ABC):
 
     def force(self, t: Values) -> tuple[Lanes, Lanes] | None:
         """None: F = 0."""
-        del t
         return None
 
     def advance(self, z: Lanes, t: Values, row: Lanes, corner: Values, defect: Values) -> Advance:
@@ -168,7 +167,6 @@ class ForceLine(PlainCurve):
 
     def parameters(self, t: Values) -> Parameters:
         """Parameters, the same for all t."""
-        del t
         return self.p.copy()
 
     def rate(self, t: Values) -> Parameters:

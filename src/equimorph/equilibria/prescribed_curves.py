@@ -242,7 +242,6 @@ class TrackedCurve:
 
     def force(self, t: Values) -> tuple[Lanes, Lanes] | None:
         """None: F = 0."""
-        del t
         return None
 
     def advance(

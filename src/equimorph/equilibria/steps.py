@@ -56,14 +56,6 @@ class Bracket(Columns):
     what: Some
 
 
-def initial_front(curve: Curve, z: Lanes, t: Values) -> Front:
-    """Unit tangents at known points, pointing towards growing t."""
-    still = np.zeros_like(z)
-    one, none = np.ones(len(z)), np.zeros(len(z))
-    step = curve.advance(z, t, still, one, none)
-    return _unit(curve, Front(z + step.dz, t, step.tangent_z, step.tangent_t, step.index))
-
-
 def _unit(curve: Curve, front: Front) -> Front:
     length = squared_length(curve.metric, curve.weight, front.tangent_z, front.tangent_t)
     norm = np.sqrt(length)

@@ -8,7 +8,7 @@ from enum import StrEnum
 
 import numpy as np
 
-from equimorph.arrays import Float, Values
+from equimorph.arrays import Float
 
 Spots = Float[np.ndarray, "lanes space"]
 """One place or direction for each state."""
@@ -158,8 +158,3 @@ def supports_of_point(
     if 0.0 < turning < np.inf:
         add(SupportKind.COIL, inward)
     return tuple(found)
-
-
-def unit_vectors(angles: Values) -> Spots:
-    """Unit vectors at angles."""
-    return np.stack([np.cos(angles), np.sin(angles)], axis=1)

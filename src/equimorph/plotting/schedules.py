@@ -137,18 +137,13 @@ def _draw(
     snaps: Int[np.ndarray, " snaps"],
 ) -> None:
     """One quantity over the share of the route, with thin lines at the way-points and gaps."""
-    for at in _corner_places(schedule):
+    for at in schedule.progress[schedule.way_points]:
         ax.axvline(at, color="#c4c4c4", linewidth=0.5, zorder=1)
     for at in schedule.progress[snaps]:
         ax.axvline(at, color=style.ROUTE_COLOUR, linewidth=0.9, linestyle=":", zorder=2)
     x, y = (np.insert(each, snaps + 1, np.nan) for each in (schedule.progress, values))
     ax.plot(x, y, color=colour, linewidth=1.4, zorder=3)
     ax.set_xlim(0.0, 1.0)
-
-
-def _corner_places(schedule: Schedule) -> list[float]:
-    """Shares of the route at which its corners lie."""
-    return [float(schedule.progress[step]) for step in schedule.way_points]
 
 
 def _mark(

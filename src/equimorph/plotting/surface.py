@@ -30,8 +30,6 @@ from equimorph.tasks.motion.tracking import Tracking
 from equimorph.tasks.route import Route
 
 Points = Float[np.ndarray, "vertices 3"]
-Cells = Float[np.ndarray, "cells 3 3"]
-Pieces = Float[np.ndarray, "pieces 3 3"]
 
 _ELEVATION, _AZIMUTH = 23.0, 125.0
 """Direction of view, in degrees."""

@@ -12,7 +12,6 @@ import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
-from matplotlib.lines import Line2D
 from matplotlib.patches import Polygon
 from matplotlib.patheffects import AbstractPathEffect, Stroke as Casing
 
@@ -336,11 +335,7 @@ def limits(
 
 def _line(ax: Axes, outline: Lines, **look: Any) -> Moving:
     (line,) = ax.plot(*outline[0].T, **look)
-    return Moving(line, partial(_place_line, line, outline))
-
-
-def _place_line(line: Line2D, outline: Lines, k: int) -> None:
-    line.set_data(*outline[k].T)
+    return Moving(line, lambda k: line.set_data(*outline[k].T))
 
 
 def _place_area(area: Polygon, outline: Lines, k: int) -> None:

@@ -228,7 +228,6 @@ class Structure(Rebuilt, Inertial):
 
     def along_orbits(self, z: Lanes, p: Parameters) -> Lanes:
         """Rates of z at which a continuous symmetry moves states; 0 where none does."""
-        del p
         return np.zeros_like(z)
 
     def pick_on_orbits(self, z: Lanes, p: Parameters, towards: Parameters) -> Lanes:
@@ -237,7 +236,6 @@ class Structure(Rebuilt, Inertial):
         Where a continuous symmetry carries states over into each other, all along the way, the one
         that the structure's phase condition picks.
         """
-        del p, towards
         return z
 
     @property
@@ -261,7 +259,6 @@ class Structure(Rebuilt, Inertial):
 
         The columns are the unit tangent, normal and binormal.
         """
-        del z, p, s
         return None
 
     @property
@@ -278,7 +275,6 @@ class Structure(Rebuilt, Inertial):
 
         A structure with loads draws each as a force or a couple proportional to it.
         """
-        del z, p
         return Drawing()
 
     written: ClassVar[Written] = {"energy": "total_energy"}
@@ -343,7 +339,6 @@ class Structure(Rebuilt, Inertial):
 
     def growth(self, p: Float[np.ndarray, " parameters"]) -> Growth:
         """Whether the energy at parameters p is smooth on Rⁿ and grows at infinity."""
-        del p
         return Growth(False, "it is not known whether the energy grows at infinity")
 
     def error_estimate(self, z: Lanes, p: Parameters) -> Values:
@@ -357,17 +352,14 @@ class Structure(Rebuilt, Inertial):
 
     def may_resolve(self, z: Lanes, p: Parameters) -> Flags:
         """Whether finer discretisations may resolve states that this one does not."""
-        del p
         return np.full(len(z), self.is_discretised)
 
     def missing_bound(self, within: Sequence[Constraint]) -> str:
         """Bound to add where there are equilibria without end within others; empty if none."""
-        del within
         return ""
 
     def compiled_steps(self, within: Sequence[Constraint]) -> CompiledSteps | None:
         """Compiled loops that follow straight lines under constraints; None: there are none."""
-        del within
         return None
 
     @property
@@ -377,7 +369,6 @@ class Structure(Rebuilt, Inertial):
 
     def index_out_of_plane(self, z: Lanes, p: Parameters) -> Int[np.ndarray, " lanes"] | None:
         """Independent movements out of the plane that lower the energy; None: not judged."""
-        del z, p
         return None
 
 

@@ -144,7 +144,6 @@ class Equations(ABC):
         All values in the boxes lie within the bounds, rounding included; None if this structure
         knows no bounds.
         """
-        del z, p
         return None
 
     def plain_energy(self) -> dict[str, Any] | None:

@@ -213,7 +213,6 @@ class Inertial(Equations, ABC):
         MissingError
             If the structure has no mass.
         """
-        del z, p
         raise MissingError(
             f"`structure` must have a mass; this {self.kind} has none. {self.massless}".rstrip()
         )

@@ -211,14 +211,6 @@ def find_descriptor(structure: Structure, text: str) -> Descriptor:
         raise InputError(f"{own}, {more}{got}{rest}") from None
 
 
-def _effort(structure: Structure, inner: str) -> Descriptor:
-    return effort_of(structure, inner.strip())
-
-
-def _absolute(structure: Structure, inner: str) -> Descriptor:
-    return abs(find_descriptor(structure, inner))
-
-
 def _largest(structure: Structure, inner: str) -> Descriptor:
     parts = [find_descriptor(structure, part) for part in _COMMA.split(inner)]
     largest = largest_of(f"largest({', '.join(each.name for each in parts)})", *parts)
@@ -269,8 +261,8 @@ def _shape(axis: str, structure: Structure, inner: str) -> Descriptor:
 
 
 _FORMS: dict[str, Callable[[Structure, str], Descriptor]] = {
-    "abs": _absolute,
-    "effort": _effort,
+    "abs": lambda structure, inner: abs(find_descriptor(structure, inner)),
+    "effort": lambda structure, inner: effort_of(structure, inner.strip()),
     "largest": _largest,
     "distance": _distance,
     "outside": _outside,

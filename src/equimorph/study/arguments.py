@@ -6,7 +6,7 @@ task takes as it is written; `composite_arguments` holds those with several keys
 """
 
 import inspect
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Annotated, Any, get_args, get_origin
@@ -14,11 +14,10 @@ from typing import Annotated, Any, get_args, get_origin
 from pydantic import Field
 
 from equimorph.errors import InputError
-from equimorph.model import Box, names_of
+from equimorph.model import Box, Descriptor, names_of
 from equimorph.study.lookup import (
     Ground,
     Later,
-    RuleSection,
     at_key,
     check_parameters,
     check_point,
@@ -38,6 +37,8 @@ from equimorph.study.states import (
 )
 
 REQUIRED = inspect.Parameter.empty
+Read = Callable[[Ground, Any, str], Any]
+"""Of the value, at the key that messages name."""
 
 
 @dataclass(frozen=True)
@@ -52,6 +53,8 @@ class Argument:
     """Type of the value in the file."""
     default: Any = REQUIRED
     """Of the signature; `REQUIRED` without one."""
+    read: Read | None = None
+    """Makes of a value what it stands for; None: the value itself."""
 
     def keys(self) -> dict[str, tuple[Any, Any]]:
         """Keys with types and defaults, as pydantic takes them."""
@@ -62,7 +65,6 @@ class Argument:
 
     def needs_set(self, section: Any) -> bool:
         """Whether it can only be found on the set of the study."""
-        del section
         return False
 
     def look_up(self, ground: Ground, section: Any, place: str) -> Any:
@@ -71,8 +73,9 @@ class Argument:
         return None if value is None else self.interpret(ground, value, f"{place}.{self.key}")
 
     def interpret(self, ground: Ground, value: Any, key: str) -> Any:
-        """Return what a value stands for."""
-        del ground, key
+        """Return what a value stands for: itself, if nothing reads it."""
+        if self.read is not None:
+            return self.read(ground, value, key)
         return tuple(value) if isinstance(value, list) else value
 
 
@@ -107,112 +110,92 @@ class StateArgument(Argument):
         return Later(lambda found: choose_state(found, value, key))
 
 
-class NaturalArgument(Argument):
-    """A state without a set."""
-
-    def interpret(self, ground: Ground, value: NaturalSection, key: str) -> Any:
-        """Look up where it comes from."""
-        check_natural(ground, value, key)
-        return Later(lambda found: lift_state(found, value, key))
+def reading(read: Read) -> Callable[..., Argument]:
+    """Arguments whose values a function reads."""
+    return partial(Argument, read=read)
 
 
-class DescriptorArgument(Argument):
-    """A descriptor by its name."""
-
-    def interpret(self, ground: Ground, value: str, key: str) -> Any:
-        """Look it up."""
-        return descriptor_at(ground, value, key)
+def _natural(ground: Ground, value: NaturalSection, key: str) -> Later:
+    check_natural(ground, value, key)
+    return Later(lambda found: lift_state(found, value, key))
 
 
-class DescriptorsArgument(Argument):
-    """Descriptors by their names."""
-
-    def interpret(self, ground: Ground, value: Sequence[str], key: str) -> Any:
-        """Look them up."""
-        texts = enumerate(value)
-        return tuple(descriptor_at(ground, text, f"{key}[{i}]") for i, text in texts)
+NaturalArgument = reading(_natural)
+"""A state without a set."""
 
 
-class CoordinatesArgument(Argument):
-    """Descriptors or parameters by their names."""
-
-    def interpret(self, ground: Ground, value: Sequence[str], key: str) -> Any:
-        """Look the descriptors up."""
-        names = names_of(ground.structure.parameters)
-        return tuple(
-            text if text in names else descriptor_at(ground, text, f"{key}[{i}]")
-            for i, text in enumerate(value)
-        )
+def _descriptors(ground: Ground, value: Sequence[str], key: str) -> tuple[Descriptor, ...]:
+    return tuple(descriptor_at(ground, text, f"{key}[{i}]") for i, text in enumerate(value))
 
 
-class ValuesArgument(Argument):
-    """Values of descriptors."""
-
-    def interpret(self, ground: Ground, value: Mapping[str, float], key: str) -> Any:
-        """Look the descriptors up."""
-        return descriptors_of(ground, value, key)
-
-
-class WithinArgument(Argument):
-    """Constraints as texts."""
-
-    def interpret(self, ground: Ground, value: Sequence[str], key: str) -> Any:
-        """Look their descriptors up."""
-        return constraints_of(ground, value, key)
+def _coordinates(ground: Ground, value: Sequence[str], key: str) -> tuple[str | Descriptor, ...]:
+    names = names_of(ground.structure.parameters)
+    return tuple(
+        text if text in names else descriptor_at(ground, text, f"{key}[{i}]")
+        for i, text in enumerate(value)
+    )
 
 
-class ParametersArgument(Argument):
-    """Names of parameters, or values by such names."""
-
-    def interpret(self, ground: Ground, value: Any, key: str) -> Any:
-        """Check the names."""
-        check_parameters(ground.structure, [value] if isinstance(value, str) else value, key)
-        return value
-
-
-class BoxArgument(Argument):
-    """A box of parameters."""
-
-    def interpret(self, ground: Ground, value: Mapping[str, list[float]], key: str) -> Any:
-        """Check the names."""
-        check_parameters(ground.structure, value, key)
-        with at_key(key):
-            return Box(**{name: (bounds[0], bounds[1]) for name, bounds in value.items()})
+DescriptorArgument = reading(descriptor_at)
+DescriptorsArgument = reading(_descriptors)
+CoordinatesArgument = reading(_coordinates)
+"""Descriptors, or parameters, by their names."""
+ValuesArgument = reading(descriptors_of)
+WithinArgument = reading(constraints_of)
+RuleArgument = reading(rule_of)
 
 
-class PointsArgument(Argument):
-    """Parameters that change step by step."""
-
-    def interpret(self, ground: Ground, value: Sequence[dict[str, float]], key: str) -> Any:
-        """Check names and values."""
-        for i, step in enumerate(value):
-            check_values(ground.structure, step, f"{key}[{i}]")
-        return value
+def _parameters(ground: Ground, value: Any, key: str) -> Any:
+    check_parameters(ground.structure, [value] if isinstance(value, str) else value, key)
+    return value
 
 
-class WayPointsArgument(Argument):
-    """Points of the set through which a way leads."""
-
-    def interpret(self, ground: Ground, value: Sequence[dict[str, float]], key: str) -> Any:
-        """Refuse points outside the box."""
-        for i, corner in enumerate(value):
-            check_point(ground.box, corner, f"{key}[{i}]", whole=False)
-        return value
+ParametersArgument = reading(_parameters)
+"""Names of parameters, or values by such names."""
 
 
-class LegsArgument(Argument):
-    """Targets and loads that move leg by leg: what is no parameter is a descriptor."""
+def _box(ground: Ground, value: Mapping[str, list[float]], key: str) -> Box:
+    check_parameters(ground.structure, value, key)
+    with at_key(key):
+        return Box(**{name: (bounds[0], bounds[1]) for name, bounds in value.items()})
 
-    def interpret(self, ground: Ground, value: Sequence[dict[str, float]], key: str) -> Any:
-        """Look the descriptors up."""
-        names = names_of(ground.structure.parameters)
-        return [
-            {
-                (text if text in names else descriptor_at(ground, text, f"{key}[{i}]")): x
-                for text, x in leg.items()
-            }
-            for i, leg in enumerate(value)
-        ]
+
+BoxArgument = reading(_box)
+
+
+def _points(ground: Ground, value: Sequence[dict[str, float]], key: str) -> Any:
+    for i, step in enumerate(value):
+        check_values(ground.structure, step, f"{key}[{i}]")
+    return value
+
+
+PointsArgument = reading(_points)
+"""Parameters that change step by step."""
+
+
+def _points_of_set(ground: Ground, value: Sequence[dict[str, float]], key: str) -> Any:
+    for i, corner in enumerate(value):
+        check_point(ground.box, corner, f"{key}[{i}]", whole=False)
+    return value
+
+
+WayPointsArgument = reading(_points_of_set)
+"""Points of the set, inside its box, through which a way leads."""
+
+
+def _legs(ground: Ground, value: Sequence[dict[str, float]], key: str) -> Any:
+    names = names_of(ground.structure.parameters)
+    return [
+        {
+            (text if text in names else descriptor_at(ground, text, f"{key}[{i}]")): x
+            for text, x in leg.items()
+        }
+        for i, leg in enumerate(value)
+    ]
+
+
+LegsArgument = reading(_legs)
+"""Targets and loads that move leg by leg: what is no parameter is a descriptor."""
 
 
 class ActuatorsArgument(Argument):
@@ -220,7 +203,6 @@ class ActuatorsArgument(Argument):
 
     def needs_set(self, section: Any) -> bool:
         """The box is that of the set."""
-        del section
         return True
 
     def interpret(self, ground: Ground, value: Sequence[str], key: str) -> Any:
@@ -235,11 +217,3 @@ class ActuatorsArgument(Argument):
                 f"got {', '.join(unknown)}."
             )
         return {name: limits[name] for name in value}
-
-
-class RuleArgument(Argument):
-    """A rule that prefers one of the states over a point."""
-
-    def interpret(self, ground: Ground, value: RuleSection, key: str) -> Any:
-        """Look up its descriptor or parameter."""
-        return rule_of(ground, value, key)

@@ -11,7 +11,15 @@ from equimorph.model import Grid, Rates, Schedule, position
 from equimorph.structures import State, Structure
 from equimorph.study.arguments import Argument, StateArgument
 from equimorph.study.data_files import ScheduleName
-from equimorph.study.fields import Count, Interval, Positive, Step, is_number, requirement, two
+from equimorph.study.fields import (
+    Interval,
+    Intervals,
+    Positive,
+    Step,
+    is_number,
+    requirement,
+    two,
+)
 from equimorph.study.lookup import (
     Ground,
     Later,
@@ -29,7 +37,6 @@ from equimorph.tasks.robustness.error_model import ErringStructure, Errors
 from equimorph.tasks.start import check_schedule
 from equimorph.tasks.verification.schedule_check import first_state
 
-Intervals = Annotated[list[Count], Field(min_length=2, max_length=2)]
 OBJECTIVES = ("length", "travel", "work", "clearance", "time")
 """What a route may have least of."""
 EXTREME = re.compile(r"(?P<which>peak|least)\((?P<descriptor>.+)\)")

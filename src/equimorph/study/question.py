@@ -322,7 +322,6 @@ class Kind(ABC, Generic[A]):
 
     def refusal(self, question: Question, answer: A) -> str:
         """Say why the question was refused; empty if it was answered."""
-        del question
         status = getattr(answer, "status", "")  # maps have one for each setting
         is_refused = isinstance(status, str) and status == "refused"
         return str(getattr(answer, "why", "")) if is_refused else ""

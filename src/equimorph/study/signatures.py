@@ -222,9 +222,8 @@ def _argument(form: Form, key: str, default: Any, other: Mapping[Any, Made]) -> 
             make, written = other.get(make, (make, MEANINGS.get(form.name, written)))  # noqa: PLW2901
             return make(form.name, key, written, default)
     if form.options is not None:
-        return composite.OptionsArgument(
-            form.name, key, form.options, default, _parts(form.options)
-        )
+        parts = _parts(form.options)
+        return composite.OptionsArgument(form.name, key, form.options, default, parts=parts)
     return None if form.plain is None else Argument(form.name, key, form.plain, default)
 
 

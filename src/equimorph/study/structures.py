@@ -41,119 +41,6 @@ SPATIAL_KEYS = ("rotation", "x", "y", "z")
 """Keys of an end of a rod in space."""
 
 
-def _load(shape: Any) -> Any:
-    """Check a load shape; one requirement for all forms makes one readable line."""
-    if shape not in ("uniform", "left-half") and not is_table(shape):
-        raise requirement(
-            'be "uniform", "left-half" or a table [[s, Q], ...] of finite numbers '
-            f"up to {LARGEST:g}"
-        )
-    return shape
-
-
-def _profile(shape: Any) -> Any:
-    if not (is_number(shape) or is_table(shape) or isinstance(shape, str)):
-        raise requirement(
-            f"be a number up to {LARGEST:g}, a table [[s, f], ...] of such, or a text with its unit"
-        )
-    return shape
-
-
-def _end(given: Any) -> Any:
-    return _end_of(given, PLANAR_KEYS)
-
-
-def _end_in_space(given: Any) -> Any:
-    return _end_of(given, SPATIAL_KEYS)
-
-
-def _end_of(given: Any, keys: tuple[str, ...]) -> Any:
-    table = isinstance(given, dict) and set(given) <= set(keys)
-    parts = given.values() if table else [given]
-    if not all(isinstance(part, str) or (table and is_number(part)) for part in parts):
-        example = f'{{ {keys[0]} = "free", x = "held", y = 2.0 }}'
-        raise requirement(f'be a word like "clamped", or a table like {example}')
-    return given
-
-
-def _terms(given: Any) -> Any:
-    """Check that terms are data of numbers, texts and lists; the rod itself knows their keys."""
-
-    def plain(value: Any) -> bool:
-        if isinstance(value, list):
-            return all(map(plain, value))
-        return isinstance(value, str) or is_number(value)
-
-    for term in given if isinstance(given, list) else [given]:
-        if not (isinstance(term, dict) and all(map(plain, term.values()))):
-            raise requirement(
-                'be a table like { term = "point force", s = 0.5 }, or a list of such tables, of '
-                f"texts and numbers up to {LARGEST:g}"
-            )
-    return given
-
-
-def _formula(given: Any) -> Any:
-    if not (isinstance(given, str) or (type(given) in (int, float) and abs(given) <= LARGEST)):
-        raise requirement(f"be a formula in quotes, or a finite number up to {LARGEST:g}")
-    return given
-
-
-def _quantity(given: Any) -> Any:
-    """Check its form; whether a unit fits is known to the structure."""
-    if not (is_number(given) or isinstance(given, str)):
-        raise requirement(f'be a number up to {LARGEST:g}, or a text with its unit like "2 N m^2"')
-    return given
-
-
-def _stiff(given: Any) -> Any:
-    if is_number(given) and not given > 0:
-        raise requirement("be greater than 0")
-    return _quantity(given)
-
-
-def _section(given: Any) -> Any:
-    """Check the form of a cross-section; the rod itself knows its keys."""
-    plain = isinstance(given, dict) and all(
-        isinstance(value, str) or is_number(value) for value in given.values()
-    )
-    if not (plain and isinstance(given.get("kind"), str)):
-        raise requirement(
-            'be a table like { kind = "strip", width = "20 mm", thickness = "0.5 mm", '
-            'E = "210 GPa", nu = 0.3 }'
-        )
-    return given
-
-
-def _support(given: Any) -> Any:
-    table = given if isinstance(given, dict) else {}
-    fine = table and all(isinstance(value, str) or is_number(value) for value in table.values())
-    if not (isinstance(given, str) or fine):
-        raise requirement(
-            'be "fixed", "pinned", axes to hold like "y", or a table like '
-            '{ x = "held", angle = 2.0 }'
-        )
-    return given
-
-
-def _load_on_frame(given: Any) -> Any:
-    entries = given if isinstance(given, list) and len(given) > 1 else [None]
-    if not (all(map(is_number, entries)) or all(isinstance(each, str) for each in entries)):
-        raise requirement('be numbers like [0, -1], or joints under pressure like ["A", "B"]')
-    return given
-
-
-def _support_in_space(given: Any) -> Any:
-    table = given if isinstance(given, dict) else {}
-    fine = table and all(isinstance(x, str | list) or is_number(x) for x in table.values())
-    if not (isinstance(given, str) or fine):
-        raise requirement(
-            'be "fixed", "pinned", axes to hold like "xz", or a table like '
-            '{ line = [1, 0, 0], rotation = "held" }'
-        )
-    return given
-
-
 _NUMBER = {"type": "number", "minimum": -LARGEST, "maximum": LARGEST}
 _TEXT = {"type": "string"}
 _ROW = {"type": "array", "items": _NUMBER, "minItems": 2, "maxItems": 2}
@@ -167,30 +54,130 @@ _ONE_OR_MORE_TERMS = {"anyOf": [_ONE_TERM, {"type": "array", "items": _ONE_TERM}
 _SECTION = {**_WORDS, "properties": {"kind": {"enum": list(CROSS_SECTIONS)}}, "required": ["kind"]}
 
 
-def _end_form(words: Iterable[str], keys: Iterable[str]) -> WithJsonSchema:
+def checked(fits: Callable[[Any], bool], words: str) -> AfterValidator:
+    """Check values; one requirement for all forms of a value makes one readable line."""
+
+    def check(given: Any) -> Any:
+        if not fits(given):
+            raise requirement(words)
+        return given
+
+    return AfterValidator(check)
+
+
+def _is_plain(value: Any) -> bool:
+    """Whether it is a number or a text."""
+    return isinstance(value, str) or is_number(value)
+
+
+def _are_plain(table: Any) -> bool:
+    return isinstance(table, dict) and all(map(_is_plain, table.values()))
+
+
+def _end_of(words: Iterable[str], keys: tuple[str, ...]) -> Any:
+    """Form of an end of a rod: a word, or a table of some keys."""
+
+    def fits(given: Any) -> bool:
+        return isinstance(given, str) or (_are_plain(given) and set(given) <= set(keys))
+
+    example = f'{{ {keys[0]} = "free", x = "held", y = 2.0 }}'
+    check = checked(fits, f'be a word like "clamped", or a table like {example}')
     table = {"properties": dict.fromkeys(keys, _NUMBER_OR_TEXT), "additionalProperties": False}
-    return WithJsonSchema({"anyOf": [{"enum": list(words)}, {"type": "object", **table}]})
+    schema = {"anyOf": [{"enum": list(words)}, {"type": "object", **table}]}
+    return Annotated[Any, check, WithJsonSchema(schema)]
+
+
+def _are_terms(given: Any) -> bool:
+    """Whether they are data of numbers, texts and lists; the rod itself knows their keys."""
+
+    def plain(value: Any) -> bool:
+        return all(map(plain, value)) if isinstance(value, list) else _is_plain(value)
+
+    terms = given if isinstance(given, list) else [given]
+    return all(isinstance(term, dict) and all(map(plain, term.values())) for term in terms)
+
+
+def _is_load_on_frame(given: Any) -> bool:
+    entries = given if isinstance(given, list) and len(given) > 1 else [None]
+    return all(map(is_number, entries)) or all(isinstance(each, str) for each in entries)
+
+
+def _is_support_in_space(given: Any) -> bool:
+    parts = given.values() if isinstance(given, dict) else ()
+    fine = parts and all(isinstance(x, list) or _is_plain(x) for x in parts)
+    return isinstance(given, str) or bool(fine)
 
 
 LoadShape = Annotated[
     Any,
-    AfterValidator(_load),
+    checked(
+        lambda given: given in ("uniform", "left-half") or is_table(given),
+        f'be "uniform", "left-half" or a table [[s, Q], ...] of finite numbers up to {LARGEST:g}',
+    ),
     WithJsonSchema({"anyOf": [{"enum": ["uniform", "left-half"]}, _TABLE]}),
 ]
-Formula = Annotated[Any, AfterValidator(_formula), WithJsonSchema(_NUMBER_OR_TEXT)]
-Quantity = Annotated[Any, AfterValidator(_quantity), WithJsonSchema(_NUMBER_OR_TEXT)]
-Stiffness = Annotated[Any, AfterValidator(_stiff), WithJsonSchema(_NUMBER_OR_TEXT)]
+Formula = Annotated[
+    Any,
+    checked(_is_plain, f"be a formula in quotes, or a finite number up to {LARGEST:g}"),
+    WithJsonSchema(_NUMBER_OR_TEXT),
+]
+Quantity = Annotated[
+    Any,
+    checked(_is_plain, f'be a number up to {LARGEST:g}, or a text with its unit like "2 N m^2"'),
+    WithJsonSchema(_NUMBER_OR_TEXT),
+]
+Stiffness = Annotated[
+    Quantity, checked(lambda given: not is_number(given) or given > 0, "be greater than 0")
+]
 UnitSystem = Annotated[dict[str, str], Field(min_length=2, max_length=2)]
 Profile = Annotated[
-    Any, AfterValidator(_profile), WithJsonSchema({"anyOf": [_NUMBER, _TEXT, _TABLE]})
+    Any,
+    checked(
+        lambda given: _is_plain(given) or is_table(given),
+        f"be a number up to {LARGEST:g}, a table [[s, f], ...] of such, or a text with its unit",
+    ),
+    WithJsonSchema({"anyOf": [_NUMBER, _TEXT, _TABLE]}),
 ]
-Term = Annotated[Any, AfterValidator(_terms), WithJsonSchema(_ONE_OR_MORE_TERMS)]
-CrossSection = Annotated[Any, AfterValidator(_section), WithJsonSchema(_SECTION)]
-EndOfRod = Annotated[Any, AfterValidator(_end), _end_form(ENDS, PLANAR_KEYS)]
-EndInSpace = Annotated[Any, AfterValidator(_end_in_space), _end_form(SPATIAL_ENDS, SPATIAL_KEYS)]
-Support = Annotated[Any, AfterValidator(_support)]
-LoadOnFrame = Annotated[Any, AfterValidator(_load_on_frame), WithJsonSchema(_FORCE_OR_CHAIN)]
-SupportInSpace = Annotated[Any, AfterValidator(_support_in_space)]
+Term = Annotated[
+    Any,
+    checked(
+        _are_terms,
+        'be a table like { term = "point force", s = 0.5 }, or a list of such tables, of '
+        f"texts and numbers up to {LARGEST:g}",
+    ),
+    WithJsonSchema(_ONE_OR_MORE_TERMS),
+]
+CrossSection = Annotated[
+    Any,
+    checked(
+        lambda given: _are_plain(given) and isinstance(given.get("kind"), str),
+        'be a table like { kind = "strip", width = "20 mm", thickness = "0.5 mm", '
+        'E = "210 GPa", nu = 0.3 }',
+    ),
+    WithJsonSchema(_SECTION),
+]
+EndOfRod = _end_of(ENDS, PLANAR_KEYS)
+EndInSpace = _end_of(SPATIAL_ENDS, SPATIAL_KEYS)
+Support = Annotated[
+    Any,
+    checked(
+        lambda given: isinstance(given, str) or bool(given and _are_plain(given)),
+        'be "fixed", "pinned", axes to hold like "y", or a table like { x = "held", angle = 2.0 }',
+    ),
+]
+LoadOnFrame = Annotated[
+    Any,
+    checked(_is_load_on_frame, 'be numbers like [0, -1], or joints under pressure like ["A", "B"]'),
+    WithJsonSchema(_FORCE_OR_CHAIN),
+]
+SupportInSpace = Annotated[
+    Any,
+    checked(
+        _is_support_in_space,
+        'be "fixed", "pinned", axes to hold like "xz", or a table like '
+        '{ line = [1, 0, 0], rotation = "held" }',
+    ),
+]
 
 
 Forms = Mapping[str, Any]

@@ -116,7 +116,6 @@ def _in_parameters(
     free, scales = setting.free, setting.scales
 
     def change(z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes d"]:
-        del z
         return np.asarray((p - state.p)[:, free] / scales)
 
     far = np.linalg.norm(change(eset.points.z, eset.points.p), axis=1)

@@ -130,20 +130,17 @@ def _faults(fabric: Fabric, tolerance: float, memory: Memory) -> tuple[int, int,
 
 
 def _as_it_is(fabric: Fabric, tolerance: float, memory: Memory) -> Fabric:
-    del tolerance, memory
     return fabric
 
 
 def _curves_cut(fabric: Fabric, tolerance: float, memory: Memory) -> Fabric:
     """Chords of folds and constraints that pass a vertex turn cells over."""
-    del tolerance
     edges = update_edges(fabric, memory)
     return _cut(fabric, edges, _bad(fabric), (edges.marks & CURVES) > 0, memory)
 
 
 def _all_cut(fabric: Fabric, tolerance: float, memory: Memory) -> Fabric:
     """All edges of bad cells and of those that touch them."""
-    del tolerance
     edges, near = update_edges(fabric, memory), np.zeros(len(fabric.vertices), bool)
     near[fabric.cells[_bad(fabric)]] = True
     everything = np.ones(len(edges.ends), bool)
@@ -180,7 +177,6 @@ def _merge(short: float) -> Step:
     """Vertices merged whose distance is less than that share of the edges around."""
 
     def step(fabric: Fabric, tolerance: float, memory: Memory) -> Fabric:
-        del tolerance
         return refill(fabric, memory, fine=True, short=short)
 
     return step

@@ -113,7 +113,6 @@ def _value(node: ast.expr, names: Mapping[str, Any]) -> Any:
 
 
 def _number(node: Any, names: Mapping[str, Any]) -> Any:
-    del names
     return float(node.value) if type(node.value) in (int, float) else None
 
 

@@ -291,7 +291,6 @@ class AnyFrame(StressedFrame, Shortening, Refinable):
 
     def drawn_pressures(self, z: Lanes, p: Parameters) -> list[Forces]:
         """Pressures, which frames in space do not have."""
-        del z, p
         return []
 
     def _drawn_actuators(self, z: Lanes, p: Parameters) -> tuple[Actuator, ...]:

@@ -8,7 +8,7 @@ import numpy as np
 from equimorph.arrays import Flags, Float, Lanes, Nodal, Parameters, Scalars
 from equimorph.linalg.dense import multiply
 from equimorph.model import Forces, Support
-from equimorph.model.drawing import supports_of_point, unit_vectors
+from equimorph.model.drawing import supports_of_point
 from equimorph.structures.frame.any_frame import AnyFrame
 from equimorph.structures.frame.mechanics import FrameMechanics, Points
 from equimorph.structures.frame.model import FrameModel
@@ -236,7 +236,8 @@ class FrameFields(FrameMechanics, AnyFrame):
         found: list[Support] = []
         for joint, stiffness in enumerate(self.model.network.supports):
             if stiffness.any():
-                inward = unit_vectors(turns[:, joint] + self._inward_angle(joint))
+                angles = turns[:, joint] + self._inward_angle(joint)
+                inward = np.stack([np.cos(angles), np.sin(angles)], axis=1)
                 held = np.eye(2), stiffness[:2]
                 found += supports_of_point(*held, float(stiffness[2]), places[:, joint], inward)
         return tuple(found)

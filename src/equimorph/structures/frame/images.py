@@ -267,7 +267,6 @@ class SpatialImage(FrameImage):
         self, z: Lanes, scalars: Float[np.ndarray, "lanes scalars"]
     ) -> Float[np.ndarray, "lanes unknowns"]:
         """Quaternions of the free nodes, and angles of hinges."""
-        del scalars
         model, rows = self.model, 4 * len(self.model.free)
         turns = z[:, :rows].reshape(len(z), len(model.free), 4)
         image, angles = np.empty_like(turns), np.empty_like(z[:, rows : model.unknowns])

@@ -185,7 +185,6 @@ class FrameNetwork(AnyFrameNetwork):
 
     def check_move(self, joint: str, move: Float[np.ndarray, "2"], what: str) -> None:
         """Refuse a move of a support along an axis that it neither holds nor springs."""
-        del what
         for axis in np.flatnonzero(move):
             self.support_place(joint, AXES[axis])
 

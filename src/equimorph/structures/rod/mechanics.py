@@ -83,7 +83,6 @@ class RodMechanics(Equations):
 
     def shortenings(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes points"]:
         """Elastic shortenings of the axis at the nodes of every element; 0 if inextensible."""
-        del p
         return np.zeros((len(z), 1))
 
     @abstractmethod
@@ -158,7 +157,6 @@ class PlanarMechanics(RodMechanics):
 
         A bound: sign (−1 for a lower one), unit of the curvature, bound, and ease.
         """
-        del bounds
         return None
 
     def enclosure(self, z: Interval, p: Interval) -> Enclosed | None:

@@ -327,7 +327,6 @@ class Rod(Described):
 
     def growth(self, p: Float[np.ndarray, " parameters"]) -> Growth:
         """Not known: ever more states are wound up ever more, and the resolution cuts them off."""
-        del p
         return Growth(False, "the resolution cuts off states that are wound up")
 
     def error_estimate(self, z: Lanes, p: Parameters) -> Values:

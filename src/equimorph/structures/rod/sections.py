@@ -85,7 +85,6 @@ class CrossSection(ABC):
 
     def fibres(self, system: UnitSystem) -> Fibres | None:
         """Fibres in the surface, in a system of units; None where the size is not known."""
-        del system
         return None
 
     @abstractmethod

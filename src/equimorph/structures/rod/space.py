@@ -199,7 +199,6 @@ def lateral_margin(
         return unit * block.margin(z, p)
 
     def not_judged(z: Lanes, p: Parameters) -> list[str]:
-        del p
         return [NOT_JUDGED] * len(z)
 
     # beyond second order, what a couple inside the rod does in space is nobody's convention

@@ -256,5 +256,4 @@ class SpatialFrameFields(OrbitFrameMechanics, AnyFrame):
         self, z: Lanes, p: Parameters, places: Float[np.ndarray, "lanes joints 3"]
     ) -> tuple[Support, ...]:
         """Symbols of the supports, at places of the joints."""
-        del z, p
         return spatial_symbols(self.model.network, places)

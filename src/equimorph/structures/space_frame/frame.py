@@ -152,7 +152,6 @@ class DescribedSpatialFrame(SpatialFrameFields):
         column = 4 * len(self.model.free) + int(found[0])
 
         def value(z: Lanes, p: Parameters) -> Values:
-            del p
             return z[:, column].copy()
 
         return self._make(f"hinge({made.edge_names[at]},{joint})", "rad", value)

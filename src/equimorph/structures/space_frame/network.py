@@ -124,7 +124,6 @@ class SpatialNetwork(AnyFrameNetwork):
         self, forces: Float[np.ndarray, "joints 3"], couples: Float[np.ndarray, " joints"]
     ) -> bool:
         """Whether supports alone bear a load on the joints."""
-        del couples
         pairs = zip(self.supports, forces, strict=True)
         return all(
             support.holds(force) and bool(np.isinf(support.stiffness).all())

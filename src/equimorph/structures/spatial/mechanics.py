@@ -214,7 +214,6 @@ class SpatialMechanics(SpatialLagrangian, JointEquations):
 
     def along_orbits(self, z: Lanes, p: Parameters) -> Lanes:
         """Rates of z at which states turn about an axis for nothing: 0."""
-        del p
         return np.zeros_like(z)
 
     # --- energy ---------------------------------------------------------------------------------
@@ -300,7 +299,6 @@ class SpatialMechanics(SpatialLagrangian, JointEquations):
         self, parts: tuple[np.ndarray, ...], z: Lanes, p: Parameters, shift: Shift = None
     ) -> Solver:
         """Solves with F_z − shift·mass."""
-        del parts
         return partial(self.solve, z, p, shift=shift)
 
     def index(self, z: Lanes, p: Parameters) -> Int[np.ndarray, " lanes"]:

@@ -231,7 +231,6 @@ class PinnedMechanics(SpatialMechanics):
 
     def along_orbits(self, z: Lanes, p: Parameters) -> Lanes:
         """ξ; 0 on the axis."""
-        del p
         return np.where(self.on_axis(z)[:, None], 0.0, self.velocity(z))
 
     def resolved(self, z: Lanes, p: Parameters) -> Flags:

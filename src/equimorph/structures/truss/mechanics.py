@@ -110,10 +110,6 @@ class TrussMechanics(AnyNetwork):
             full[:, first] -= forces[:, bar]
         return full
 
-    def _sum_at_joints(self, forces: Float[np.ndarray, "lanes bars space"]) -> Lanes:
-        """The same for the joints' moves that are free."""
-        return np.asarray(self._all_joints(forces)[:, ~self.network.held])
-
     @cached_property
     def _unknowns_of_bars(self) -> Int[np.ndarray, "bars both"]:
         pairs = self.network.unknowns[self.network.ends]
@@ -174,9 +170,8 @@ class TrussMechanics(AnyNetwork):
         twice = ggg * gv * gw + ggl * (gv * lw + lv * gw) + gll * lv * lw
         twice = twice + 2.0 * gg * (dv * dw).sum(axis=2)
         by_v, by_w = gg * gv + gl * lv, gg * gw + gl * lw
-        return self._sum_at_joints(
-            2.0 * (twice[..., None] * d + by_v[..., None] * dw + by_w[..., None] * dv)
-        )
+        pulls = twice[..., None] * d + by_v[..., None] * dw + by_w[..., None] * dv
+        return np.asarray(self._all_joints(2.0 * pulls)[:, ~self.network.held])
 
     def enclosure(self, z: Interval, p: Interval) -> Enclosed:
         """Bounds over boxes; a bar pulls by f = 2 ∂W/∂g · d, d the vector between its joints."""
@@ -249,7 +244,6 @@ class TrussMechanics(AnyNetwork):
 
     def displacements(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes joints space"]:
         """Moves of the joints from where they are drawn."""
-        del p
         return self.moves_of(z)
 
     def drawing(self, z: Lanes, p: Parameters) -> Drawing:

@@ -166,7 +166,6 @@ class Truss(TrussMechanics, Shortening):
 
     def inertial_force(self, z: Lanes, p: Parameters, velocity: Velocity) -> Velocity:
         """Zero: the mass matrix is constant."""
-        del z, p
         return np.zeros_like(velocity)
 
     @property

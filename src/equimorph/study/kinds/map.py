@@ -196,7 +196,6 @@ class StrongestKind(Kind[Answer]):
 
     def refusal(self, question: Question, answer: Answer) -> str:
         """Reason why no setting carries anything."""
-        del question
         return f"{answer[1].why}." if answer[1].status == "refused" else ""
 
 

@@ -69,7 +69,6 @@ class ShapeKind(Kind[Shapes]):
 
     def refusal(self, question: Question, answer: Shapes) -> str:
         """Reason why there is none."""
-        del question
         return "" if len(answer) else answer.why
 
 
@@ -226,7 +225,6 @@ class CalibrationKind(Kind[Calibration]):
 
     def refusal(self, question: Question, answer: Calibration) -> str:
         """Reason why no fit exists."""
-        del question
         return "" if answer.fitted else f"{answer.status}: {answer.why}."
 
 

@@ -89,7 +89,6 @@ class MotionKind(Kind[Verification]):
 
     def refusal(self, question: Question, answer: Verification) -> str:
         """Reason why it cannot be executed."""
-        del question
         return "" if answer.verified else f"{answer.why[:1].upper()}{answer.why[1:]}."
 
 

@@ -148,7 +148,6 @@ class RouteKind(Kind[Routes]):
 
     def refusal(self, question: Question, answer: Routes) -> str:
         """Reason why there is no route."""
-        del question
         return "" if answer[0].arrived else answer[0].explanation
 
 
@@ -264,7 +263,6 @@ class VerifyKind(Kind[Verification]):
 
     def refusal(self, question: Question, answer: Verification) -> str:
         """Reason why it cannot be executed."""
-        del question
         return "" if answer.verified else f"{answer.why[:1].upper()}{answer.why[1:]}."
 
 

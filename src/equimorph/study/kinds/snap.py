@@ -58,7 +58,6 @@ class SnapKind(Kind[LeastSnap]):
 
     def refusal(self, question: Question, answer: LeastSnap) -> str:
         """Reason why no snap was found."""
-        del question
         return "" if answer.landing is not None else answer.why
 
 

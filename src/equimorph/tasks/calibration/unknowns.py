@@ -55,13 +55,10 @@ class Unknowns:
     def made(self, x: Vector) -> Structure:
         """Structure of some unknowns; refused if none has such data, like a negative stiffness."""
         values = {name: float(x[at]) for name, at in self.data.items()}
-        if self.family is None or np.array_equal(x[list(self.data.values())], self._nominal):
+        of_data = list(self.data.values())
+        if self.family is None or np.array_equal(x[of_data], self.start[of_data]):
             return self.structure
         return self.family.make(**{**self.family.nominal, **values})
-
-    @property
-    def _nominal(self) -> Vector:
-        return self.start[list(self.data.values())]
 
     def parameters(self, x: Vector) -> Parameters:
         """All parameters of all states."""

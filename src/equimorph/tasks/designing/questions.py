@@ -166,9 +166,13 @@ def limit_piece(guess: State, load: str, met: Constraint | None) -> Piece | None
 
     def find(made: Structure, near: State) -> Piece | None:
         free = np.array([at])
+        target: Fold | Values
         constraint = carry_over(met, old, made)
-        target = Fold() if constraint is None else _equality(constraint)
-        guards = Guards(lower_index=np.zeros(1, int)) if constraint is None else Guards()
+        if constraint is None:
+            target, guards = Fold(), Guards(lower_index=np.zeros(1, int))
+        else:
+            bound = np.array([[constraint.bound]])
+            target, guards = Values((constraint.descriptor.function,), bound), Guards()
         here = settle(
             made, near.z[None], near.p[None], free_directions(made, free, 1), [target], guards
         )
@@ -193,10 +197,6 @@ def limit_piece(guess: State, load: str, met: Constraint | None) -> Piece | None
         return Piece(kind, state, np.array([-here.p[0, at]]), scalars, free, along, find)
 
     return find(old, guess)
-
-
-def _equality(constraint: Constraint) -> Values:
-    return Values((constraint.descriptor.function,), np.array([[constraint.bound]]))
 
 
 def _slope(made: Structure, met: Constraint, here: Settled, along: Carried) -> float:

@@ -104,7 +104,6 @@ class Paths(ABC):
 
     def suspects(self, vertices: Samples, edges: Edges) -> Bool[np.ndarray, " edges"]:
         """Edges to examine although the map changes little over them; by default none."""
-        del vertices
         return np.zeros(len(edges), bool)
 
     @abstractmethod

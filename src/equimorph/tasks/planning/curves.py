@@ -325,11 +325,6 @@ def join_curves(curves: Sequence[Curves]) -> Curves:
     return Curves.concatenate(numbered)
 
 
-def split_curves(curves: Curves, count: int) -> list[Curves]:
-    """Curves one by one."""
-    return [curves.take(curves.route == route) for route in range(count)]
-
-
 def solve_block_tridiagonal(
     blocks: Float[np.ndarray, "nodes d d"],
     beside: Float[np.ndarray, "legs d d"],

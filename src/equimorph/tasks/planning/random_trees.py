@@ -19,8 +19,6 @@ STEP = 1e-5
 """Step of the central differences along the set, in the units of the directions."""
 SWEEPS = 12
 """Rounds of projections onto all constraints in turn."""
-INSIDE = 0.02
-"""How far inside a bound settings are pushed, as a share of it."""
 
 
 @dataclass(frozen=True)
@@ -206,8 +204,3 @@ def project_onto_constraints(
             change -= share[:, None] * slopes[:, k]
         change = np.clip(change, low, high)
     return change
-
-
-def insets(within: tuple[Constraint, ...]) -> Float[np.ndarray, " constraints"]:
-    """How far inside each bound to aim."""
-    return np.array([INSIDE * abs(constraint.bound) for constraint in within])

@@ -25,7 +25,6 @@ from equimorph.tasks.planning.random_trees import (
     Tree,
     TreePath,
     constraint_slopes,
-    insets,
     join_paths,
     project_onto_constraints,
 )
@@ -36,6 +35,8 @@ from equimorph.tasks.start import check_equilibrium
 
 RESERVES = (1.0, 1.1)
 """Factors on the demanded margin that are tried in turn."""
+INSIDE = 0.02
+"""How far inside a bound settings are pushed, as a share of it."""
 CONNECTIONS = 4
 """Nodes of the other tree that are tried for each new one."""
 
@@ -283,8 +284,9 @@ class _Search:
         # loads move by the whole of the last direction, actuators by shares of the other directions
         excess = excess + slopes[:, :, -1]
         low, high = (course.box.lower - here) / half, (course.box.upper - here) / half
+        inside = np.array([INSIDE * abs(constraint.bound) for constraint in within])
         change = project_onto_constraints(
-            (a - here) / half, excess, slopes[:, :, :-1], low, high, insets(within)
+            (a - here) / half, excess, slopes[:, :, :-1], low, high, inside
         )
         return np.asarray(here + change * half)
 

@@ -28,7 +28,6 @@ from equimorph.tasks.planning.curves import (
     Curves,
     CurveSteps,
     join_curves,
-    split_curves,
 )
 from equimorph.tasks.planning.network import Demands, connect, lift_straight
 from equimorph.tasks.planning.objectives import Objective
@@ -198,7 +197,8 @@ class Shortener:
         for strength in strengths[:-1]:
             every = self._with_walls(every, count, strength, NEARLY)
             every = every if self.demands.margin == 0.0 else self._with_floors(every)
-        return split_curves(self._with_walls(every, count, strengths[-1], ENOUGH), count)
+        every = self._with_walls(every, count, strengths[-1], ENOUGH)
+        return [every.take(every.route == route) for route in range(count)]
 
     def _with_walls(self, curves: Curves, count: int, strength: float, enough: float) -> Curves:
         """Curves after steps with walls of a strength, relative to the squared lengths."""

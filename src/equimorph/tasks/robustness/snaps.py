@@ -169,7 +169,6 @@ class _Moves:
 
     def changes(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes d"]:
         """Changes of the free parameters from the state to others, in their scales."""
-        del z
         setting = self.eset.setting
         return np.asarray((p - self.state.p)[:, setting.free] / setting.scales)
 
@@ -249,7 +248,8 @@ class _Moves:
         for _ in range(HALVINGS):
             if snap.length < (1.0 + NEAR) * length[0]:
                 break
-            middle, found = self._on_folds(_midway(here, near))
+            midway = SetPoints(0.5 * (here.z + near.z), 0.5 * (here.p + near.p), here.rows)
+            middle, found = self._on_folds(midway)
             if not found[0]:
                 break
             between = self.shortest(middle.p)
@@ -277,7 +277,3 @@ class _Moves:
         closest = vertices[[np.linalg.norm(place - here, axis=1).argmin()]]
         spot = SetPoints(fold.z[None], fold.p[None], points_at_vertices(eset, closest).rows)
         return SetPoints(spot.z, spot.p, self._folds.frames(spot)[1])
-
-
-def _midway(one: SetPoints, other: SetPoints) -> SetPoints:
-    return SetPoints(0.5 * (one.z + other.z), 0.5 * (one.p + other.p), one.rows)
