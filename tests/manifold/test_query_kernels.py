@@ -66,18 +66,26 @@ def test_cells_near_points_are_those_whose_barycentric_coordinates_say_so(d):
 
 
 def test_guesses_interpolate_and_follow_the_root_from_folds():
-    """The formulas of both, hit by hit; beyond a facet on folds at the mirror image."""
+    """The formulas of both, hit by hit; beyond a facet on folds x² grows as inside, without end."""
     x, cells = sheets(2)
     generator = np.random.default_rng(0)
     z, folded = generator.normal(size=(len(x), 5)), generator.uniform(size=len(x)) < 0.4
     cell = generator.integers(len(cells), size=50)
     weights = generator.normal(0.3, 0.3, size=(50, 3))
+    weights[:20] *= 30.0
     found = guesses((cell, weights), cells, folded, z, CLOSEST)
-    regular = ~folded[cells[cell]]
-    mirrored = regular & (regular.sum(axis=1, keepdims=True) == 1)
-    within = np.where(mirrored, np.abs(weights), np.maximum(weights, 0.0))
+    beyond = ~folded[cells[cell]] & (weights < 0.0)
+    beyond &= (~folded[cells[cell]]).sum(axis=1, keepdims=True) == 1
+    assert beyond.any(axis=1).sum() > 5
+    within = np.maximum(weights, 0.0)
     within /= within.sum(axis=1, keepdims=True)
-    for guess, own, share in zip(found, cells[cell], within, strict=True):
+    for guess, own, share, far, weight in zip(
+        found, cells[cell], within, beyond, weights, strict=True
+    ):
+        if far.any():
+            foot, root = share @ z[own], np.sqrt(max(-weight[far].item(), CLOSEST))
+            np.testing.assert_allclose(guess, foot + root * (z[own][far][0] - foot), atol=1e-9)
+            continue
         np.testing.assert_allclose(guess, plain_root(share, folded[own]) @ z[own], atol=1e-9)
         again = root_weights(share[None], folded[own][None])[0] @ z[own]
         np.testing.assert_allclose(again, guess, rtol=0, atol=1e-14)

@@ -122,7 +122,8 @@ def root_shares(weights, folded, closest):
 def guesses(hits, cells, folded, z, closest):
     """Interpolation between the corners of cells, at their points nearest to those of hits.
 
-    Beyond a facet on folds, at the mirror images of points. hits: cell, weights.
+    Beyond a facet on folds, at the mirror images of points, which may lie beyond the corner across
+    from it: folds of slivers bulge by many of their heights. hits: cell, weights.
     """
     cell, weights = hits
     count, corners, size = len(cell), cells.shape[1], z.shape[1]
@@ -130,18 +131,22 @@ def guesses(hits, cells, folded, z, closest):
     share, at_fold = np.empty((1, corners)), np.empty((1, corners), np.bool_)
     for i in range(count):
         own, total = cells[cell[i]], 0.0
-        regular = 0
+        regular, beyond = 0, 0.0
         for k in range(corners):
             at_fold[0, k] = folded[own[k]]
-            regular += not at_fold[0, k]
-        for k in range(corners):
             share[0, k] = max(weights[i, k], 0.0)
-            if regular == 1 and not at_fold[0, k]:
-                share[0, k] = abs(weights[i, k])
             total += share[0, k]
-        for k in range(corners):
-            share[0, k] /= total
-        root_shares(share, at_fold, closest)
+            if not at_fold[0, k]:
+                regular += 1
+                beyond = -weights[i, k]
+        if regular == 1 and beyond > 0.0:
+            root = np.sqrt(max(beyond, closest))
+            for k in range(corners):
+                share[0, k] = share[0, k] / total * (1.0 - root) if at_fold[0, k] else root
+        else:
+            for k in range(corners):
+                share[0, k] /= total
+            root_shares(share, at_fold, closest)
         first = own[0]
         for j in range(size):
             out[i, j] = share[0, 0] * z[first, j]

@@ -301,8 +301,10 @@ class Sheets:
             near,
         )
         lifted, which = lift_to(self.points[corner], p[owner], self.constraints)
-        z = np.concatenate([solved, lifted])
-        point = np.concatenate([of_solved, owner[which]])
+        # lifts that begin on a constraint do not end there
+        good = are_feasible(self.constraints, lifted, p[owner[which]])
+        z = np.concatenate([solved, lifted[good]])
+        point = np.concatenate([of_solved, owner[which[good]]])
         numbers = np.unique(near.point)
         z, point, index = self._distinct(z, point, p)
         for _ in range(PARTNERS):
