@@ -7,7 +7,7 @@ the multipliers. As for rods in space, ½ k m (|q|² − 1)² keeps lengths at 1
 
 import numpy as np
 
-from equimorph.arrays import Float, Lanes, Parameters, Scalars, Values
+from equimorph.arrays import Float, Lanes, Parameters, Scalars
 from equimorph.errors import InputError
 from equimorph.structures.equations import Direction
 from equimorph.structures.space_frame.model import SpatialFrameModel
@@ -188,23 +188,6 @@ class SpatialFrameLagrangian:
         return np.asarray(out)
 
     # --- contract -------------------------------------------------------------------------------
-
-    def energy(self, z: Lanes, p: Parameters) -> Values:
-        """L without the multipliers' part."""
-        model = self.model
-        q, w, _, y = self.jets(z, p)
-        _, _, v = self.strains(w)
-        moment = self.point_moments(v, y)[0]
-        free = np.einsum("eiab,leib->leia", model.stiff, v[0]) - moment
-        _, tension, stretch = (jet[0] for jet in self.tensions(w, y))
-        soft = model.compliance[model.owner][:, None] * tension
-        density = 0.5 * dot(moment - free, v[0]) - (stretch - 0.5 * soft) * tension
-        total = np.einsum("ei,lei->l", model.weights, density)
-        total = total + 0.5 * np.einsum("ls,st,lt->l", y[0], model.quadratic, y[0])
-        m = self.constraints
-        total = total - (y[0][:, :m] * self.by_scalars(w, y)[0][:, :m]).sum(axis=1)
-        excess = dot(q[0], q[0]) - 1.0
-        return np.asarray(total + 0.125 * (excess**2 @ model.stiff_lengths))
 
     def equations(self, z: Lanes, p: Parameters, *directions: Direction) -> Jet:
         """F with its derivatives along directions."""

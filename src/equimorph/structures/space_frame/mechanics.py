@@ -5,7 +5,7 @@ from functools import cached_property, partial
 
 import numpy as np
 
-from equimorph.arrays import Entries, Flags, Float, Int, Lanes, Parameters, Sides
+from equimorph.arrays import Entries, Flags, Float, Int, Lanes, Parameters, Sides, Values
 from equimorph.linalg import BorderedSolution
 from equimorph.linalg.dense import no_border
 from equimorph.linalg.determinants import clear_overflows
@@ -13,6 +13,7 @@ from equimorph.linalg.lanes import over_lanes
 from equimorph.linalg.sparse import SparseLayout
 from equimorph.structures.discrete import linearise
 from equimorph.structures.equations import AnyBorder, JointEquations, Shift, Solver
+from equimorph.structures.space_frame.energy_kernels import energies_lanes
 from equimorph.structures.space_frame.kernels import linearise_lanes
 from equimorph.structures.space_frame.lagrangian import SpatialFrameLagrangian
 from equimorph.structures.space_frame.model import SpatialFrameModel
@@ -183,21 +184,39 @@ class Tables:
     @cached_property
     def shared(self) -> tuple[np.ndarray, ...]:
         """What the kernel shares among lanes."""
-        model, acting = self.model, self.model.acting
+        model = self.model
         rows = model.quadratic[: model.multipliers]
         at = np.argwhere(rows)
         arrays = (
-            model.patterns.turns[:, model.held], model.nodes, model.owner,
-            model.mesh.reference.derivative, 1.0 / model.element_lengths,
-            model.weights, model.tangents, model.arclengths, model.stiff, model.moment_of_strain,
-            model.compliance, acting.counts, acting.ties, acting.numbers, acting.start, acting.drop,
-            model.strains, model.elongation[..., None], model.free, model.place, model.held,
+            *self._elements, model.free, model.place, model.held,
             model.hinged, model.parents, model.hinge_axes, self.hinges_of, model.stiff_lengths,
             4.0 * model.node_weights[model.free], self.dofs,
             self._slots(self._pairs(self.dofs, self.dofs)),
             self._slots(self._pairs(self._crossing, self.dofs)),
             self._slots(self._pairs(self._crossing[self._first], self._crossing[self._first])),
             self.node_slots, at, rows[at[:, 0], at[:, 1]], self.constant,
+        )  # fmt: skip
+        return tuple(np.ascontiguousarray(array) for array in arrays)
+
+    @property
+    def _elements(self) -> tuple[np.ndarray, ...]:
+        """What supports hold, elements, and the forces that act in pieces."""
+        model, acting = self.model, self.model.acting
+        return (
+            model.patterns.turns[:, model.held], model.nodes, model.owner,
+            model.mesh.reference.derivative, 1.0 / model.element_lengths,
+            model.weights, model.tangents, model.arclengths, model.stiff, model.moment_of_strain,
+            model.compliance, acting.counts, acting.ties, acting.numbers, acting.start, acting.drop,
+            model.strains, model.elongation[..., None],
+        )  # fmt: skip
+
+    @cached_property
+    def of_energy(self) -> tuple[np.ndarray, ...]:
+        """What the kernel of energies shares among lanes."""
+        model = self.model
+        arrays = (
+            *self._elements, model.free, model.place, model.held, model.hinged, model.parents,
+            model.hinge_axes, model.stiff_lengths, model.quadratic,
         )  # fmt: skip
         return tuple(np.ascontiguousarray(array) for array in arrays)
 
@@ -225,6 +244,13 @@ class SpatialFrameMechanics(SpatialFrameLagrangian, JointEquations):
         return self.tables.layout
 
     # --- contract -------------------------------------------------------------------------------
+
+    def energy(self, z: Lanes, p: Parameters) -> Values:
+        """L without the multipliers' part."""
+        self.scalars(z, p)
+        found, given = np.empty(len(z)), [np.ascontiguousarray(each) for each in (z, p)]
+        over_lanes(energies_lanes, self.tables.of_energy, given, [found])
+        return found
 
     def linearised(
         self, z: Lanes, p: Parameters, dp: Parameters, shift: Shift = None
