@@ -14,6 +14,7 @@ from equimorph.equilibria.settle import Guards, settle
 from equimorph.equilibria.soft_modes import extent_of_guesses, soft_modes
 from equimorph.equilibria.trace import trace
 from equimorph.equilibria.trace_options import EventCode, TraceOptions
+from equimorph.linalg.apart import firsts_apart
 from equimorph.model import Constraint, worst_relative_excess
 from equimorph.structures import Structure
 from equimorph.structures.contract import Symmetry
@@ -298,18 +299,17 @@ class Pools:
             mine, known = z[group == each], self.z[self.group == each]
             pool = np.concatenate([known, mine[distinct(structure, mine)]])
             pool = np.concatenate([pool, *self.ground.images(pool, int(each))])
-            kept = distinct(structure, pool)
+            kept = distinct(structure, pool, len(known))
             new = pool[kept[kept >= len(known)]]
             self.z = np.concatenate([self.z, new])
             self.group = np.concatenate([self.group, np.full(len(new), each)])
         return group
 
 
-def distinct(structure: Structure, z: Lanes) -> Int[np.ndarray, " distinct"]:
-    """Return the first of each group of points closer than `SAME_STATE` in the metric."""
-    kept: list[int] = []
+def distinct(structure: Structure, z: Lanes, known: int = 0) -> Int[np.ndarray, " distinct"]:
+    """Return the first of each group of points closer than `SAME_STATE` in the metric.
+
+    The first `known` are taken to be different.
+    """
     u = z[:, : structure.unknowns] * np.sqrt(structure.mass)
-    for i in range(len(z)):
-        if not kept or np.sqrt(((u[kept] - u[i]) ** 2).sum(axis=1)).min() > SAME_STATE:
-            kept.append(i)
-    return np.array(kept, dtype=int)
+    return firsts_apart(u, SAME_STATE, known)

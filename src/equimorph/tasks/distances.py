@@ -4,6 +4,7 @@ import numpy as np
 
 from equimorph.arrays import Float, Int, Values
 from equimorph.equilibria.settle import distances
+from equimorph.linalg.apart import firsts_apart
 from equimorph.structures import State, States
 
 
@@ -29,8 +30,4 @@ def distinct(states: States, tolerance: float) -> Int[np.ndarray, " distinct"]:
     structure = states.structure
     u = states.z[:, : structure.unknowns] * np.sqrt(structure.mass)
     places = np.concatenate([u, states.p / structure.scales], axis=1)
-    kept: list[int] = []
-    for k, place in enumerate(places):
-        if not kept or np.linalg.norm(places[kept] - place, axis=1).min() > tolerance:
-            kept.append(k)
-    return np.array(kept, dtype=int)
+    return firsts_apart(places, tolerance)
