@@ -49,7 +49,8 @@ def play(structure, simulator, velocity, step, time=2.5):
 
 
 @pytest.mark.parametrize(
-    ("space", "simulator", "step"), [(2, "mujoco", 1e-3), (2, "own", 1e-2), (3, "own", 1e-2)]
+    ("space", "simulator", "step"),
+    [(2, "mujoco", 1e-3), (2, "own", 1e-2), pytest.param(3, "own", 1e-2, marks=pytest.mark.slow)],
 )
 def test_a_cantilever_lags_behind_its_clamp_as_its_modes_do(space, simulator, step):
     """Euler and Bernoulli's cantilever; all replays deviated by 0, as if its mass were at rest.
@@ -77,6 +78,7 @@ def test_mujoco_and_the_own_equations_agree_at_large_rates():
     assert np.abs(np.interp(times, t, chain) - own).max() < 0.025
 
 
+@pytest.mark.slow
 def test_a_support_that_stops_gives_its_velocity_back():
     """A clamp that moves for one period of the first mode and stops leaves hardly any of it.
 

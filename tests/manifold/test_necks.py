@@ -96,6 +96,7 @@ def test_small_spheres_are_whole(number):
     assert sorted(each.euler_characteristic for each in eset.components) == [1, 2]
 
 
+@pytest.mark.slow
 def test_folds_of_sheets_that_have_nothing_in_common_are_no_necks():
     """A truss with 200 states over a point: folds face each other everywhere, and nothing is there.
 

@@ -68,7 +68,7 @@ def integral_of(force, g, x, a, b):
 
 USUAL = {
     "pitchfork": ("lies in a side", "touches a corner"),
-    "transcritical": ("lies in a side", "touches a side from outside", "leads through a corner"),
+    "transcritical": ("touches a side from outside", "leads through a corner"),
 }
 """Places at which the others are tried each time, too; there folds are tried everywhere."""
 CASES = [

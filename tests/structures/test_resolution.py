@@ -55,6 +55,7 @@ def test_lengths_count_in_the_units_of_the_bound():
     assert rod.resolving(40.0).resolution == Rod().resolving(20.0).resolution
 
 
+@pytest.mark.slow
 def test_a_set_lacks_no_states_with_elements_for_its_bound():
     """Two stiff members between clamps: their waves are short long before they are curved."""
     coarse, bound = toggle(elements=2, degree=8), 8.0
