@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import pairwise
 
 import numpy as np
@@ -17,6 +17,7 @@ from equimorph.linalg import BorderedSolution
 from equimorph.linalg.determinants import no_determinants
 from equimorph.model import Descriptor
 from equimorph.structures import Advance, Structure
+from equimorph.structures.equations import LinearSystem
 from equimorph.tolerances import METRIC_DIFFERENCE
 
 Columns = Float[np.ndarray, "lanes columns"]
@@ -52,30 +53,37 @@ class Pieces:
     def value(self, t: Values) -> Columns:
         """Values at t."""
         inside = np.minimum(np.maximum(t, 0.0), 1.0)
-        out, beyond = self._series(0, inside), t - inside
-        if beyond.any():
-            out += beyond[:, None] * self._series(1, inside)
-        return out
+        beyond = t - inside
+        if not beyond.any():
+            return self._series(inside, 0)[0]
+        out, rate = self._series(inside, 0, 1)
+        return np.asarray(out + beyond[:, None] * rate)
+
+    def value_and_rate(self, t: Values) -> tuple[Columns, Columns]:
+        """Values at t, and their first derivative."""
+        inside = np.minimum(np.maximum(t, 0.0), 1.0)
+        out, rate = self._series(inside, 0, 1)
+        return out + (t - inside)[:, None] * rate, rate
 
     def rate(self, t: Values) -> Columns:
         """First derivative."""
-        return self._series(1, np.clip(t, 0.0, 1.0))
+        return self._series(np.clip(t, 0.0, 1.0), 1)[0]
 
     def bend(self, t: Values) -> Columns:
         """Second derivative."""
         within = ((t >= 0.0) & (t <= 1.0))[:, None]
-        return np.where(within, self._series(2, np.clip(t, 0.0, 1.0)), 0.0)
+        return np.where(within, self._series(np.clip(t, 0.0, 1.0), 2)[0], 0.0)
 
-    def _series(self, derivative: int, t: Values) -> Columns:
-        """Σ c_k cos(k arccos x) for the piece of each lane."""
+    def _series(self, t: Values, *derivatives: int) -> list[Columns]:
+        """Σ c_k cos(k arccos x) for the piece of each lane: values (0) or derivatives."""
         last = len(self.breaks) - 2
         piece = np.minimum(np.searchsorted(self.breaks, t, side="right") - 1, last)
         low, high = self.breaks[piece], self.breaks[piece + 1]
         x = (2.0 * t - low - high) / (high - low)
-        series = self.tables[derivative][self.which, piece]
         angle = np.arccos(np.minimum(np.maximum(x, -1.0), 1.0))
-        terms = np.cos(angle[:, None] * np.arange(series.shape[1]))
-        return np.asarray(np.einsum("lk,lkc->lc", terms, series))
+        terms = np.cos(angle[:, None] * np.arange(self.tables[0].shape[2]))
+        series = [self.tables[each][self.which, piece] for each in derivatives]
+        return [np.einsum("lk,lkc->lc", terms[:, : each.shape[1]], each) for each in series]
 
     def lengths(self, scales: Float[np.ndarray, " columns"]) -> Values:
         """Length of each lane's curve, columns measured by their scales."""
@@ -252,13 +260,13 @@ class TrackedCurve:
         The set has k + 1 directions here; the descriptors and the closing row are k + 1 conditions.
         """
         structure, k, many = self.structure, len(self.free), len(self.structure.parameters)
-        given, slope = self.prescribed.value(t), self.prescribed.rate(t)
+        given, slope = self.prescribed.value_and_rate(t)
         x, p = self._states(z, given[:, :many])
         rate = slope[:, :many].copy()
         rate[:, self.free] = 0.0
         size, changes = structure.size, self._changes(rate)
-        residual = structure.residual(x, p)
-        solved = _tangent_space(structure, x, p, residual, changes)
+        system = structure.linear_system(x, p, changes)
+        solved = _tangent_space(system)
         onto, along = solved.x[:, 0], solved.x[:, 1:]
         linear = self._linear(x, p, given[:, many:], slope[:, many:], solved.x, changes)
         closing = self._closing(solved.x, row, corner)
@@ -267,13 +275,12 @@ class TrackedCurve:
         rhs[:, 0, :k], rhs[:, 0, k], rhs[:, 1, k] = -linear.value, -defect - closing[:, 0], 1.0
         step, tangent = (_solve_small(matrix, rhs) @ along).transpose(1, 0, 2)
         step += onto
-        missed = self._values(x, p) - given[:, many:]
         return Advance(
             self._join(step[:, :size], step[:, size:-1]),
             step[:, -1].copy(),
             self._join(tangent[:, :size], tangent[:, size:-1]),
             tangent[:, -1].copy(),
-            np.abs(np.concatenate([residual, missed], axis=1)).max(axis=1),
+            np.abs(np.concatenate([system.residual, linear.value], axis=1)).max(axis=1),
             solved.negative - structure.constraints,
             no_determinants(len(z)),
         )
@@ -300,9 +307,6 @@ class TrackedCurve:
         rate = slope[:, :, None] * moves[:, None, :, -1]
         return Linear(found.value - rate[:, :, 0], found.slopes - rate[:, :, 1:])
 
-    def _values(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes k"]:
-        return np.stack([descriptor.function(z, p) for descriptor in self.descriptors], 1)
-
     def _changes(self, rate: Parameters) -> Float[np.ndarray, "lanes directions parameters"]:
         """Directions in parameter space: each free parameter, and the given rate."""
         units = np.zeros((len(rate), len(self.free), rate.shape[1]))
@@ -318,26 +322,19 @@ class TrackedCurve:
         return np.asarray(np.einsum("lmi,li->lm", moves, whole))
 
 
-def _tangent_space(
-    structure: Structure,
-    z: Lanes,
-    p: Parameters,
-    residual: Lanes,
-    changes: Float[np.ndarray, "lanes k parameters"],
-) -> BorderedSolution:
-    """A step onto the set, and directions along it, for changes of the parameters.
-
-    Any rows that see the tangent space will do.
-    """
-    (lanes, size), k = z.shape, changes.shape[1]
-    columns = [
-        structure.parameter_derivative(z, p, np.ascontiguousarray(changes[:, i])) for i in range(k)
-    ]
-    rows = np.cos(np.outer(np.arange(1, k + 1), 1.7 * np.arange(size + k)) + 0.4)
-    rows = np.tile(rows, (lanes, 1, 1))
+def _tangent_space(system: LinearSystem) -> BorderedSolution:
+    """A step onto the set, and directions along it, for changes of the parameters."""
+    lanes, k, size = system.columns.shape
+    rows = np.tile(_normals(k, size + k), (lanes, 1, 1))
     rhs = np.zeros((lanes, k + 1, size + k))
-    rhs[:, 0, :size], rhs[:, 1:, size:] = -residual, np.eye(k)
-    return structure.solve(z, p, rhs, (np.stack(columns, 1), rows[:, :, :size], rows[:, :, size:]))
+    rhs[:, 0, :size], rhs[:, 1:, size:] = -system.residual, np.eye(k)
+    return system.solve(rhs, (system.columns, rows[:, :, :size], rows[:, :, size:]))
+
+
+@lru_cache
+def _normals(k: int, size: int) -> Float[np.ndarray, "k size"]:
+    """Rows that close the system: any that see the tangent space will do."""
+    return np.cos(np.outer(np.arange(1, k + 1), 1.7 * np.arange(size)) + 0.4)
 
 
 def _solve_small(

@@ -43,8 +43,9 @@ STARTING, CORRECTING, AIMING, CONVERGED, REFUSED, ENDED, SHORT, LONG, STUCK = ra
 """Stages: at t = 0, before the first step; in Newton's iteration; in that of a step to the end of
 t; step converged; step refused; lane finished; given up: step too short, too many steps, or a
 singular start."""
-WAITS = -1
-"""Stage of a step that converged and waits to be judged together with others."""
+WAITS, HELD = -1, -2
+"""Stage of a step that converged and waits to be judged together with others; less its stage, that
+of a lane whose pivot is unsafe and that waits for others."""
 
 ARRIVAL, RETURN, FOLD, BRANCH, CONSTRAINT, CRITICAL = 1, 2, 4, 8, 16, 32
 """Bits of what can happen in a step."""

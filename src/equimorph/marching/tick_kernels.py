@@ -19,6 +19,7 @@ from equimorph.marching.kernels import (
     CORNER,
     DEFECT,
     EARLY,
+    HELD,
     HIDDEN,
     LANE,
     LENGTH,
@@ -48,7 +49,8 @@ doubtful, may hide something or graze a constraint; lanes are given up."""
 LAST, HERE, NEW = range(3)
 """Rows of the values of each constraint: at the step before, here, and at the end of the step."""
 PATIENCE = 1000
-"""Steps that lanes with rare steps may spend waiting for others: as long as judging them takes."""
+"""Steps that lanes may spend waiting for others: as long as it takes to judge rare steps, or to
+solve with unsafe pivots."""
 ENOUGH = 4
 """Reciprocal share of free rows from which on more lanes are asked for."""
 
@@ -199,11 +201,27 @@ def any_below(ratio, active, least):
 
 
 @njit(**{**FLAGS, "_nrt": False})
-def _pass_over(counts, active, ratio):
-    """Call the steps of lanes that wait safe: nobody looks at them."""
+def _hold(counts, ratio, guard, state):
+    """Let lanes with unsafe pivots wait for others; whether all that wait are to be solved now.
+
+    Nobody looks at the pivots of lanes that wait to be judged.
+    """
+    held, waiting, active = 0, 0, state[ACTIVE]
     for i in range(active):
-        if counts[STAGE, i] == WAITS:
-            ratio[i] = np.inf
+        stage = counts[STAGE, i]
+        if stage == WAITS:
+            waiting, ratio[i] = waiting + 1, np.inf
+        elif not ratio[i] >= guard:
+            held += 1
+            if stage > WAITS:
+                counts[STAGE, i] = HELD - stage
+    if held == 0 or (held + waiting < active and state[SPENT] < PATIENCE):
+        return False
+    state[SPENT] = 0 if waiting == 0 else state[SPENT]
+    for i in range(active):
+        if counts[STAGE, i] <= HELD:
+            counts[STAGE, i] = HELD - counts[STAGE, i]
+    return True
 
 
 @njit(**{**FLAGS, "_nrt": False})
@@ -213,7 +231,7 @@ def _assemble(tangent, row, counts, grazing, state, locates):
     That is so as soon as waiting has cost as much as judging will, or no lane is left to wait for.
     Tangents wait in the rows of closing equations, which lanes get anew after their judgement.
     """
-    waiting, active = 0, state[ACTIVE]
+    waiting, held, active = 0, 0, state[ACTIVE]
     for i in range(active):
         if counts[STAGE, i] == CONVERGED:
             rare = locates and (counts[WHAT, i] & (BRANCH | HIDDEN | EARLY)) != 0
@@ -224,8 +242,9 @@ def _assemble(tangent, row, counts, grazing, state, locates):
                 for j in range(row.shape[1]):
                     row[i, j] = tangent[i, j]
         waiting += counts[STAGE, i] == WAITS
-    state[SPENT] += waiting
-    if waiting == 0 or (waiting < active and state[SPENT] < PATIENCE):
+        held += counts[STAGE, i] <= HELD
+    state[SPENT] += waiting + held
+    if waiting == 0 or (waiting + held < active and state[SPENT] < PATIENCE):
         return False
     state[SPENT] = 0
     for i in range(active):
@@ -300,8 +319,7 @@ def march_of(step, excess):
                     slope[:n], residual[:n], index[:n], determinant[:n], ratio[:n],
                 )  # fmt: skip
                 state[PHASE] = CORRECT
-                _pass_over(counts, active, ratio)
-                if any_below(ratio, active, guard):
+                if _hold(counts, ratio, guard, state):
                     return UNSAFE
             active = state[ACTIVE]
             if state[PHASE] == CORRECT:
