@@ -24,6 +24,7 @@ def schedule() -> Schedule:
         descriptors={"max_curvature": rng.uniform(size=7), "height(0.5)": rng.normal(size=7)},
         start={"structure": {"kind": "rod", "load": "uniform"}, "unknowns": [0.1, 1 / 3]},
         way_points=np.array([0, 3, 6]),
+        descriptor_units={"max_curvature": "1/L", "height(0.5)": "L"},
     )
 
 
@@ -37,7 +38,7 @@ def test_a_schedule_comes_back_bit_for_bit(schedule: Schedule, written: Path):
     back = read_schedule(written)
     for name in ("values", "progress", "margins", "way_points"):
         np.testing.assert_array_equal(getattr(back, name), getattr(schedule, name))
-    for name in ("names", "roles", "units", "start"):
+    for name in ("names", "roles", "units", "start", "descriptor_units"):
         assert getattr(back, name) == getattr(schedule, name)
     assert list(back.descriptors) == list(schedule.descriptors)
     for name, values in schedule.descriptors.items():
@@ -47,8 +48,8 @@ def test_a_schedule_comes_back_bit_for_bit(schedule: Schedule, written: Path):
 def test_the_table_has_a_header_and_one_row_per_step(written: Path):
     header, *rows = written.read_text().splitlines()
     assert header == (
-        "progress,Theta (rad),Delta (rad),q (4π²B/L²),nu (L),stability_margin,max_curvature,"
-        "height(0.5)"
+        "progress,Theta (rad),Delta (rad),q (4π²B/L²),nu (L),stability_margin,"
+        "max_curvature (1/L),height(0.5) (L)"
     )
     assert len(rows) == 7
 
@@ -123,8 +124,8 @@ def test_a_sidecar_without_keys_is_refused(written: Path):
 
 
 def test_a_newer_schedule_is_refused(written: Path):
-    _edit(written.with_suffix(".json"), '"version": 2', '"version": 3')
-    with pytest.raises(InputError, match="must have version 2 or less; got 3"):
+    _edit(written.with_suffix(".json"), '"version": 3', '"version": 4')
+    with pytest.raises(InputError, match="must have version 3 or less; got 4"):
         read_schedule(written)
 
 
@@ -164,6 +165,23 @@ def motion(schedule: Schedule) -> Schedule:
     )  # fmt: skip
 
 
+def test_a_schedule_without_units_of_descriptors_is_read(schedule: Schedule, written: Path):
+    """Version 2: their columns had names alone."""
+    text = written.read_text()
+    written.write_text(text.replace(" (1/L)", "").replace("(0.5) (L)", "(0.5)"))
+    sidecar = json.loads(written.with_suffix(".json").read_text())
+    del sidecar["checksum"], sidecar["descriptor_units"]
+    sidecar["version"] = 2
+    table = np.array([[float(each) for each in line.split(",")] for line in text.splitlines()[1:]])
+    sidecar["checksum"] = _checksum(sidecar, table)
+    written.with_suffix(".json").write_text(json.dumps(sidecar))
+    back = read_schedule(written)
+    np.testing.assert_array_equal(
+        back.descriptors["height(0.5)"], schedule.descriptors["height(0.5)"]
+    )
+    assert back.descriptor_units == {}
+
+
 @pytest.mark.parametrize("name", ["motion.csv", "motion.json"])
 def test_a_motion_comes_back_bit_for_bit(motion: Schedule, tmp_path: Path, name: str):
     """Identity, from a table with its sidecar and from JSON alone."""
@@ -173,6 +191,7 @@ def test_a_motion_comes_back_bit_for_bit(motion: Schedule, tmp_path: Path, name:
     for each in ("times", "values", "velocities", "accelerations", "margins", "way_points"):
         np.testing.assert_array_equal(getattr(back, each), getattr(motion, each))
     assert (back.time_unit, back.names, back.start) == ("s", motion.names, motion.start)
+    assert back.descriptor_units == motion.descriptor_units
     np.testing.assert_array_equal(back.at(0.7), motion.at(0.7))
 
 
@@ -191,7 +210,7 @@ def test_a_schedule_of_the_first_release_is_read(schedule: Schedule, written: Pa
     lines[0] = "progress,Theta,Delta,q,nu,stability_margin,max_curvature,height(0.5)"
     written.write_text("\n".join(lines) + "\n")
     sidecar = json.loads(written.with_suffix(".json").read_text())
-    for key in ("checksum", "time_unit", "derivatives"):
+    for key in ("checksum", "time_unit", "derivatives", "descriptor_units"):
         del sidecar[key]
     sidecar["version"] = 1
     table = np.array([[float(each) for each in line.split(",")] for line in lines[1:]])

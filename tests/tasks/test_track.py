@@ -239,6 +239,7 @@ def test_descriptors_with_names_of_columns_come_back(start, tmp_path, name):
             em.storage.write_schedule(schedule, tmp_path / f"table{ending}")
             back = em.storage.read_schedule(tmp_path / f"table{ending}")
             assert np.array_equal(back.descriptors[name], 7.0 + found.values[ANGLE.name])
+            assert back.descriptor_units == {ANGLE.name: ANGLE.unit, name: own.unit}
             assert np.array_equal(back.progress, schedule.progress)
             assert np.array_equal(back.margins, schedule.margins)
             assert np.array_equal(back.values, schedule.values)

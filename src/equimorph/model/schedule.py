@@ -147,6 +147,8 @@ class Schedule(Tabular):
     time_unit
         "s" for structures with units; for rods without, T = √(m L/λ_cr) with their mass m, length
         L and λ_cr = 4π²B/L².
+    descriptor_units
+        Units of the descriptors, by name; those that are left out have none.
     """
 
     names: tuple[str, ...]
@@ -162,6 +164,7 @@ class Schedule(Tabular):
     velocities: Float[np.ndarray, "steps parameters"] | None = None
     accelerations: Float[np.ndarray, "steps parameters"] | None = None
     time_unit: str = "T"
+    descriptor_units: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Check the times."""
@@ -209,7 +212,9 @@ class Schedule(Tabular):
         if self.times is not None:
             columns[TIME] = self.times
         columns |= {PROGRESS: self.progress, **self.parameters, MARGIN: self.margins}
-        columns |= {column_of(name, self.names): each for name, each in self.descriptors.items()}
+        for name, each in self.descriptors.items():
+            columns[column_of(name, self.names)] = each
+            units[column_of(name, self.names)] = self.descriptor_units.get(name, "")
         for key, word, power in DERIVATIVES:
             rates = getattr(self, key)
             for k, name in enumerate(self.names):

@@ -35,12 +35,13 @@ from equimorph.tables import heading, units_of
 from equimorph.tasks.route import Route
 
 FORMAT = "equimorph schedule"
-VERSION = 2
-"""Version of the layout of the sidecar file; 1, without times and units, can be read."""
-READABLE = (1, VERSION)
+VERSION = 3
+"""Version of the layout of the sidecar file. 1, without times and units, and 2, without those of
+descriptors, can be read."""
+READABLE = (1, 2, VERSION)
 """Versions of sidecars that can be read."""
-COLUMNS = "columns"
-"""Key of the numbers in a file of JSON alone."""
+COLUMNS, DESCRIPTOR_UNITS = "columns", "descriptor_units"
+"""Keys of the numbers in a file of JSON alone, and of the units of descriptors by name."""
 
 
 Column = Float[np.ndarray, " steps"]
@@ -120,7 +121,7 @@ def _schedule(sidecar: dict[str, Any], columns: dict[str, Column]) -> Schedule:
     """Schedule of the columns of a table, by their headers."""
     names, units = tuple(sidecar["names"]), tuple(sidecar["units"])
     plain = sidecar["version"] == 1
-    unit = sidecar.get("time_unit", "T")
+    unit, units_too = sidecar.get("time_unit", "T"), sidecar.get(DESCRIPTOR_UNITS, {})
     heads = names if plain else list(map(heading, names, units))
     values = np.column_stack([columns[head] for head in heads])
     moments = {}
@@ -137,18 +138,24 @@ def _schedule(sidecar: dict[str, Any], columns: dict[str, Column]) -> Schedule:
         values=values,
         progress=columns[PROGRESS],
         margins=columns[MARGIN],
-        descriptors={name: _descriptor(name, names, columns) for name in sidecar["descriptors"]},
+        descriptors={
+            name: _descriptor(name, units_too.get(name, ""), names, columns)
+            for name in sidecar["descriptors"]
+        },
         start=sidecar["start"],
         way_points=np.array(sidecar["way_points"], dtype=int),
         times=columns.get(heading(TIME, unit)),
         time_unit=unit,
+        descriptor_units=units_too,
         **moments,
     )
 
 
-def _descriptor(name: str, parameters: tuple[str, ...], columns: dict[str, Column]) -> Column:
+def _descriptor(
+    name: str, unit: str, parameters: tuple[str, ...], columns: dict[str, Column]
+) -> Column:
     """Column of a descriptor; files of 0.1 give it the name of a parameter, too."""
-    head = column_of(name, parameters)
+    head = heading(column_of(name, parameters), unit)
     return columns[head if head in columns else name]
 
 
@@ -170,6 +177,7 @@ def _sidecar(schedule: Schedule) -> dict[str, Any]:
         "time_unit": schedule.time_unit,
         "derivatives": [key for key, *_ in DERIVATIVES if getattr(schedule, key) is not None],
         "descriptors": list(schedule.descriptors),
+        DESCRIPTOR_UNITS: dict(schedule.descriptor_units),
         "loads": _loads(schedule),
         "way_points": schedule.way_points.tolist(),
         "start": schedule.start,
@@ -332,6 +340,7 @@ def _write_schedule(group: h5py.Group, schedule: Schedule) -> None:
         "roles": schedule.roles,
         "units": schedule.units,
         "descriptors": list(schedule.descriptors),
+        DESCRIPTOR_UNITS: dict(schedule.descriptor_units),
         "start": schedule.start,
         "time_unit": schedule.time_unit,
     }
@@ -351,5 +360,6 @@ def _read_schedule(group: h5py.Group) -> Schedule:
         start=about["start"],
         way_points=get(group, "way_points"),
         time_unit=about.get("time_unit", "T"),
+        descriptor_units=about.get(DESCRIPTOR_UNITS, {}),
         **{name: get(group, name) for name in IN_TIME if name in group},
     )

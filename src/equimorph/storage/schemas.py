@@ -68,7 +68,7 @@ CHANGES: Mapping[str, Change] = {
     "Proof": Change(version=3, removed=("status",)),  # it follows from `why` and `bounds`
     "RobustOptimum": Change(version=2),  # older ones have no number of exchanges
     "Route": Change(version=4),  # older ones have no bottleneck, survival or relaxations
-    "Schedule": Change(version=2),  # older ones have no times
+    "Schedule": Change(version=3),  # older ones have no times, or no units of descriptors
     # older ones do not count what is not resolved
     "Shapes": Change(version=3, renamed={"wanted": "targets"}),
     "Tracking": Change(version=2),  # older ones say nothing of it

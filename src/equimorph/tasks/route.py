@@ -11,7 +11,7 @@ from equimorph.equilibria import Event, Landing, Path, TraceOptions, lift, lift_
 from equimorph.errors import InputError
 from equimorph.model import Constraint, Descriptor, Schedule, names_of
 from equimorph.structures import State, States, Structure
-from equimorph.tables import html_table
+from equimorph.tables import html_table, units_of
 from equimorph.tasks.distances import distance
 from equimorph.tasks.robustness.evidence import Survival
 from equimorph.tolerances import SAME_STATE
@@ -277,4 +277,5 @@ def schedule_of(
         start={"structure": _identity(structure), "unknowns": states.z[0].tolist()},
         way_points=corners,
         time_unit=structure.time_unit,
+        descriptor_units=units_of(descriptors),
     )
