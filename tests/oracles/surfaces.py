@@ -118,6 +118,19 @@ def hilltop(k: float, bend: float = 0.0, soft: float = 1.0) -> Polynomial:
     )
 
 
+def hilltop_beside_tricritical(c: float) -> Polynomial:
+    """y² = b on the sheet x = 0, crossed by b = y² + c x²/2 with x² = −a − c y at a = −c y.
+
+    The fold of the first sheet passes the crossing at y = 0, where two eigenvalues vanish; that of
+    the second one, y = c²/4, ends there.
+    """
+    return Polynomial(
+        lambda y, x, a, b: y**3 * (1 / 3) - b * y + x**2 * (a + c * y) * 0.5 + x**4 * 0.25,
+        2,
+        ("a", "b"),
+    )
+
+
 def three_planes() -> Polynomial:
     """x (x − a) (x − b): three sheets that all meet in one point, with three crossings."""
     return Polynomial(lambda x, a, b: integral(x * (x - a) * (x - b)), 1, ("a", "b"))

@@ -198,22 +198,28 @@ def _guess(
 
 
 def _halve(test: Callable[[float], float]) -> None:
-    """Go near a change of sign, at which the test itself may fail: another eigenvalue vanishes."""
+    """Go near a zero, at which the test itself may fail: another eigenvalue vanishes.
+
+    Poles of the test, at which folds of the side branch end on the crossing, change its sign, too.
+    """
     low, high = 0.0, 1.0
-    sign = np.sign(test(low))
+    first, last = test(low), test(high)
+    least = value = min(abs(first), abs(last))
     while high - low > NEAR:
         middle = 0.5 * (low + high)
         try:
-            same = test(middle) * sign > 0.0
+            value = test(middle)
         except _NoCrossingError:
             if high - low > FAR:
                 raise
-            return
-        low, high = (middle, high) if same else (low, middle)
+            break
+        low, high = (middle, high) if value * first > 0.0 else (low, middle)
+    if first * last > 0.0 or abs(value) >= least:
+        raise _NoCrossingError
 
 
 class _NoCrossingError(Exception):
-    """Raised where the search for a hub leaves the crossing."""
+    """Raised where the search for a hub leaves the crossing, or meets none."""
 
 
 def _coefficients(
