@@ -69,6 +69,10 @@ SMALLEST = 1e-7
 edges curves turn on their scale."""
 NOISE = 1e-6
 """Distance in the metric below which two crossings are one, and by which folds may be misplaced."""
+FLAT = 0.1
+"""Part of their distance from a crossing by which folds beside it may be misplaced: where the side
+branch is flat, as beside a pitchfork that is nearly degenerate, round-off may be more than
+`NOISE`, and Newton's method does not come to its end."""
 
 
 @dataclass(frozen=True)
@@ -203,6 +207,8 @@ def points_inside(
     """Folds and crossings of each lane, one regular point between neighbours, and where it left.
 
     Folds stay where the trace located them (`equilibria.locate`); crossings are corrected again.
+    Folds beside them are kept unless Newton's method leads from them to the crossing. They are
+    round-off then: a side branch of a pitchfork turns back there, and an eigenvalue touches zero.
     Lanes on which a crossing cannot be polished are not `good` any more.
     """
     passed = outcome.passed
@@ -222,9 +228,12 @@ def points_inside(
         crossed = passed.lanes[at[own]]
         keep[own] = _first_ones(pairing, crossed, pinned)
         doubtful = np.flatnonzero((kind == VertexKind.FOLD) & np.isin(passed.lanes[at], crossed))
-        those = edges[passed.lanes[at[doubtful]]]
-        again = _pin(pairing, those, z[doubtful], p[doubtful], VertexKind.FOLD)
-        keep[doubtful] = again.found
+        lanes = passed.lanes[at[doubtful]]
+        again = _pin(pairing, edges[lanes], z[doubtful], p[doubtful], VertexKind.FOLD)
+        moved = embed(pairing.setting, z[doubtful], p[doubtful])
+        moved = np.linalg.norm(embed(pairing.setting, again.z, again.p) - moved, axis=1)
+        off = _off_crossings(pairing, lanes, again, crossed, pinned)
+        keep[doubtful] = again.found & (moved < NOISE) | (moved < FLAT * off)
     events = Inside(passed.lanes[at], z, p, index, kind).take(keep)
     at = at[keep]
     first = np.flatnonzero(events.lanes[1:] == events.lanes[:-1])
@@ -269,6 +278,20 @@ def _first_ones(pairing: Pairing, lanes: Items, pinned: Pinned) -> ItemFlags:
     return np.concatenate([[True], ~again])
 
 
+def _off_crossings(
+    pairing: Pairing, lanes: Items, folds: Pinned, crossed: Some, crossings: Pinned
+) -> Values:
+    """Distances of folds from the nearest crossings on their lanes, which are in order."""
+    own, others = (embed(pairing.setting, each.z, each.p) for each in (folds, crossings))
+    first, last = (np.searchsorted(crossed, lanes, side) for side in ("left", "right"))
+    gap = np.full(len(lanes), np.inf)
+    for k in range(int((last - first).max(initial=0))):
+        some = np.flatnonzero(first + k < last)
+        off = np.linalg.norm(own[some] - others[first[some] + k], axis=1)
+        gap[some] = np.minimum(gap[some], off)
+    return gap
+
+
 def _pin(
     pairing: Pairing,
     edges: Items,
@@ -276,11 +299,7 @@ def _pin(
     p: Float[np.ndarray, "n P"],
     kind: VertexKind,
 ) -> Pinned:
-    """Crossings or folds on edges, polished, and which of them are where they were thought to be.
-
-    A side branch of a pitchfork turns back there, and an eigenvalue touches zero: its sign is
-    round-off for a while, which looks like folds.
-    """
+    """Crossings or folds on edges, polished."""
     setting, mesh = pairing.setting, pairing.mesh
     ends = mesh.vertices[mesh.edges[edges]] / setting.scales
     span = ends[:, 1] - ends[:, 0]
@@ -288,11 +307,7 @@ def _pin(
     place, fold = embed(setting, z, p), kind == VertexKind.FOLD
     rows = place[:, None][:, :0]
     aim = Aim(setting, fold, False, span[:, None], place, rows, crossing=not fold)
-    pinned = correct_points(aim, z, p, np.zeros(len(place)))
-    if fold:
-        moved = np.linalg.norm(embed(setting, pinned.z, pinned.p) - place, axis=1)
-        pinned = replace(pinned, found=pinned.found & (moved < NOISE))
-    return pinned
+    return correct_points(aim, z, p, np.zeros(len(place)))
 
 
 def _recorded(outcome: Traces, lane: int, span: Float[np.ndarray, " 2"]) -> int | None:
