@@ -282,7 +282,7 @@ class _Lifting:
         for number in range(rounds):
             cells = self._lift_cells(self.tiles if number == 0 else None)
             self._make_room()
-            outlook = outlook or Outlook.of(pairing, cells)
+            outlook = (outlook or Outlook.of(pairing, cells)).renewed(pairing, cells)
             last = outlook.is_hopeless(pairing, cells) or number == rounds - 1
             if cells.doubtful == 0 or last:
                 cells = _look(pairing, cells, self.finder, unseen)

@@ -140,6 +140,11 @@ class Points:
         """Make room for new grid vertices."""
         self.head = np.concatenate([self.head, np.full(vertices - len(self.head), -1)])
 
+    def over_first(self, vertices: int) -> int:
+        """Return how many points lie over the first so many grid vertices."""
+        own = self.vertex[: self.count]
+        return int(np.count_nonzero((own >= 0) & (own < vertices)))
+
     def over(self, vertex: int) -> list[int]:
         """Points over one grid vertex."""
         found, node = [], int(self.head[vertex])

@@ -173,22 +173,37 @@ GROWN = 3
 """Equilibria, over what there were at first, that must have paid: fewer cells are undecided."""
 CHEAP = 5000
 """Equilibria up to which it need not have paid: strips far narrower than cells show late."""
+FOUND = 1.1
+"""States over the vertices of a grid, relative to what there were, from which on it is judged anew.
+"""
 
 
 @dataclass(frozen=True)
 class Outlook:
-    """Undecided cells and equilibria of a grid before it is bisected.
+    """Undecided cells and equilibria of a grid before it is bisected; its vertices, states there.
 
     See docs/decisions.md, "Bisection ends where it does not help".
     """
 
     doubtful: int
     points: int
+    vertices: int
+    states: int
 
     @classmethod
     def of(cls, pairing: Pairing, cells: Cells) -> "Outlook":
         """Return that of a grid."""
-        return cls(cells.doubtful, pairing.points.count)
+        vertices = len(pairing.mesh.vertices)
+        states = pairing.points.over_first(vertices)
+        return cls(cells.doubtful, pairing.points.count, vertices, states)
+
+    def renewed(self, pairing: Pairing, cells: Cells) -> "Outlook":
+        """Return that of the grid as it is now if many states have been found over its vertices.
+
+        What they bring in doubt is no fault of bisection.
+        """
+        found = pairing.points.over_first(self.vertices)
+        return Outlook.of(pairing, cells) if found > FOUND * self.states else self
 
     @staticmethod
     def is_dim(cells: Cells) -> bool:
