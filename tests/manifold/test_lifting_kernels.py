@@ -6,6 +6,7 @@ import pytest
 import equimorph as em
 from equimorph.equilibria import TraceOptions, trace
 from equimorph.equilibria.trace_options import EventCode
+from equimorph.manifold.complex.edge_kernels import bend_edges, check_edges, lean_edges
 from equimorph.manifold.geometry.setting import Setting
 from equimorph.manifold.lifting import discs as disc_module
 from equimorph.manifold.lifting.crossing_branches import flood_crossings
@@ -233,3 +234,41 @@ def test_distances_between_points_have_the_slopes_of_their_tangents():
     gap, turn = (z[one] - z[other])[:, :3], (tangents[one] - tangents[other])[:, :, :3]
     np.testing.assert_allclose(squared, gap**2 @ mass, rtol=1e-14)
     np.testing.assert_allclose(slopes, 2.0 * np.einsum("ni,nki->nk", gap * mass, turn), atol=1e-13)
+
+
+def test_vertices_on_edges_are_looked_for_near_the_surface():
+    """On a paraboloid in the plane of two scaled parameters errors shrink with the fourth power."""
+    generator, scales = np.random.default_rng(2), np.array([0.5, 3.0])
+    metric = np.array([0, 2]), scales, np.array([2.0])  # one unknown of mass 4
+    slope, curvature = np.array([0.3, -0.2]), np.array([[0.8, 0.5], [0.5, -0.6]])
+    at, way, errors = generator.normal(size=(40, 2)), generator.normal(size=(40, 2)), []
+    for length in (0.1, 0.05):
+        there = np.concatenate([at, at + length * way])
+        z = (there @ slope + 0.5 * np.einsum("ni,ij,nj->n", there, curvature, there))[:, None]
+        p = np.insert(there * scales, 1, 7.0, axis=1)
+        tangents = 2.0 * (slope + there @ curvature)  # of the height in the metric
+        basis = np.concatenate([tangents[:, :, None], np.tile(np.eye(2), (80, 1, 1))], axis=2)
+        rows = np.swapaxes(np.linalg.qr(np.swapaxes(basis, 1, 2))[0], 1, 2).copy()
+        frame = rows.copy()
+        frame[:, :, 0] /= 2.0
+        ends = np.stack([np.arange(40), 40 + np.arange(40)], axis=1)
+        flat, t = np.empty((40, 2, 2)), np.full(40, 0.5)
+        lean_edges(z, p, rows, metric, ends, flat)
+        out = np.empty((40, 1)), np.empty((40, 3)), np.empty((40, 3)), np.empty((40, 2, 3))
+        out = *out, np.empty(40)
+        bend_edges(z, p, frame, rows, metric, ends, t, np.zeros(2, bool), flat, out)
+        own = out[1][:, [0, 2]] / scales
+        height = own @ slope + 0.5 * np.einsum("ni,ij,nj->n", own, curvature, own)
+        errors.append(np.abs(out[0][:, 0] - height).max())
+        assert np.all(out[1][:, 1] == 7.0)
+        assert np.allclose(out[2], np.column_stack([2.0 * out[0], own]), atol=1e-14)
+        found, told = np.ones(40, bool), (out[0], out[1], frame[:40])
+        check_edges(z, p, metric, ends, t, (out[2], out[4]), (0.3, 0.35, 0.5), told, found)
+        assert found.all()
+        across = np.cross(rows[:40, 0], rows[:40, 1])[:, None] / np.array([2.0, 1.0, 1.0])
+        steep = np.concatenate([across, across], axis=1)  # a plane across the edge
+        check_edges(
+            z, p, metric, ends, t, (out[2], out[4]), (0.3, 0.35, 0.5), (*told[:2], steep), found
+        )
+        assert not found.any()
+    assert errors[1] < 0.1 * errors[0] < 1e-4

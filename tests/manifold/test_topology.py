@@ -1,8 +1,13 @@
 """Topology of triangulated surfaces that are known by name."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
+from equimorph.linalg.graphs import components
 from equimorph.manifold.complex.pinches import pinched_vertices
 from equimorph.manifold.geometry.kernels import cut_rows
 from equimorph.manifold.geometry.topology import (
@@ -77,6 +82,35 @@ def test_edge_of_three_cells_links_them_but_is_no_manifold():
     assert whole.counts.max() == 3
     assert labels(3, whole.links).tolist() == [0, 0, 0]
     assert not whole.manifold.any()
+
+
+@pytest.mark.parametrize(("d", "cells"), [(1, 300), (2, 1), (2, 500), (3, 500), (3, 0)])
+def test_facets_of_random_cells_are_those_of_a_table(d, cells):
+    generator = np.random.default_rng(d)
+    corners = [generator.permutation(60)[: d + 1] for _ in range(cells)]
+    given = np.array(corners, int).reshape(-1, d + 1)
+    table: dict[tuple[int, ...], list[int]] = {}
+    for place in range(given.size):
+        cell, corner = divmod(place, d + 1)
+        table.setdefault(tuple(sorted(np.delete(given[cell], corner))), []).append(place)
+    whole, facets = adjacency(given), sorted(table)
+    assert list(map(tuple, whole.facets)) == facets
+    assert whole.counts.tolist() == [len(table[facet]) for facet in facets]
+    of_cells = [[whole.cell_facets.flat[at] for at in table[facet]] for facet in facets]
+    assert of_cells == [[k] * len(table[facet]) for k, facet in enumerate(facets)]
+    links = [pair for facet in facets for pair in pairwise(table[facet])]
+    assert list(map(tuple, whole.places)) == links
+    beside = [[place // (d + 1) for place in table[facet]] for facet in facets]
+    assert [row[row >= 0].tolist() for row in whole.beside] == beside
+
+
+def test_pieces_of_random_graphs_are_those_of_a_library():
+    generator = np.random.default_rng(7)
+    for count, links in ((1, 0), (40, 15), (1000, 480), (1000, 2000)):
+        pairs = generator.integers(0, count, (links, 2))
+        graph = coo_array((np.ones(links), pairs.T), shape=(count, count))
+        wanted = connected_components(graph, directed=False)[1]
+        assert np.array_equal(components(count, pairs), wanted)
 
 
 def test_labels_number_the_pieces_by_size():

@@ -2,9 +2,10 @@
 
 import numpy as np
 from scipy.sparse import coo_array, csr_array
-from scipy.sparse.csgraph import connected_components, dijkstra
+from scipy.sparse.csgraph import dijkstra
 
 from equimorph.arrays import Float, Int
+from equimorph.linalg.graph_kernels import join_nodes
 
 Pairs = Int[np.ndarray, "links 2"]
 Costs = Float[np.ndarray, " links"]
@@ -13,8 +14,7 @@ Path = Int[np.ndarray, " stops"]
 
 def components(count: int, pairs: Pairs) -> Int[np.ndarray, " nodes"]:
     """Number of the connected piece that each node belongs to."""
-    graph = coo_array((np.ones(len(pairs)), pairs.T), shape=(count, count))
-    return np.asarray(connected_components(graph, directed=False)[1])
+    return np.asarray(join_nodes(count, np.ascontiguousarray(pairs, np.int64)))
 
 
 def graph_of(count: int, pairs: Pairs, costs: Costs) -> csr_array:

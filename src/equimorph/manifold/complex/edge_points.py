@@ -9,6 +9,7 @@ import numpy as np
 from equimorph.arrays import Bool, Float, Int, ItemFlags, Items, ItemValues, Pairs, Some
 from equimorph.equilibria.settle import lower_index
 from equimorph.linalg.lanes import results_of
+from equimorph.manifold.complex.edge_kernels import bend_edges, check_edges, lean_edges
 from equimorph.manifold.complex.marked_complex import TETRAHEDRA, Fabric, FacetMark, held_parameters
 from equimorph.manifold.complex.vertices import Vertices, free_vertices, vertices_of
 from equimorph.manifold.geometry.exact_points import (
@@ -20,7 +21,7 @@ from equimorph.manifold.geometry.exact_points import (
 )
 from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.setting import embed
-from equimorph.manifold.geometry.tangents import Cubics, Ends, split_step
+from equimorph.manifold.geometry.tangents import Ends
 from equimorph.tolerances import IN_BOX, SAME_VERTEX
 
 CHUNK = 512
@@ -131,35 +132,48 @@ def on_edges(fabric: Fabric, target: Places, *, refining: bool = False) -> Tried
 class _Guess:
     """Points on the cubics over edges.
 
-    place: in the embedding; plane: the mean of the tangent spaces at both ends; first: the first
-    ends; length: of the edges.
+    place: in the embedding; plane: the mean of the tangent spaces at both ends; length: of the
+    edges.
     """
 
     z: Float[np.ndarray, "n size"]
     p: Float[np.ndarray, "n P"]
     place: Float[np.ndarray, "n coordinates"]
     plane: Float[np.ndarray, "n d coordinates"]
-    first: Ends
     length: ItemValues
 
 
+Metric = tuple[Int[np.ndarray, " d"], Float[np.ndarray, " d"], Float[np.ndarray, " unknowns"]]
+"""Free parameters, their scales, and roots of the mass: the embedding, as kernels take it."""
+
+
+def _metric(fabric: Fabric) -> Metric:
+    setting = fabric.setting
+    return np.asarray(setting.free), np.asarray(setting.scales), np.sqrt(setting.structure.mass)
+
+
 def _guess(fabric: Fabric, target: Places) -> _Guess:
-    setting, store, ends, t = fabric.setting, fabric.vertices, target.ends, target.t
-    first, second = (fabric.end(ends, side, target.mark) for side in range(2))
-    z, p = store.z[ends], store.p[ends]
-    moves = (p[:, 1] - p[:, 0])[:, setting.free] / setting.scales
-    chord = np.concatenate([z[:, 1] - z[:, 0], moves], axis=1)
-    frames = store.frame[ends[:, 0]], store.frame[ends[:, 1]]
-    bend = Cubics(first, second).step(frames, chord, t)
-    dz, dp = split_step(setting, t[:, None] * chord + bend)
-    z, p = z[:, 0] + dz, p[:, 0] + dp
-    for k in held_parameters(target.mark, fabric.dimension):
-        p[:, setting.free[k]] = store.p[ends[:, 0], setting.free[k]]
-    # the second space seen from the first, so that both bases point the same way
-    turned = first.rows @ np.swapaxes(second.rows, 1, 2)
-    plane = first.rows + turned @ second.rows
-    length = np.linalg.norm(second.place - first.place, axis=1)
-    return _Guess(z, p, embed(setting, z, p), plane, first, length)
+    store, ends, d, metric = fabric.vertices, target.ends, fabric.dimension, _metric(fabric)
+    flat = np.empty((len(ends), 2, d))
+    if target.mark == 0:
+        lean_edges(store.z, store.p, store.rows, metric, ends, flat)
+    else:
+        chord = np.subtract(*(store.place[ends[:, side]] for side in (1, 0)))
+        for side in range(2):
+            flat[:, side] = fabric.end(ends, side, target.mark).along(chord)
+    held = np.isin(np.arange(d), held_parameters(target.mark, d))
+    count, width = len(ends), store.rows.shape[2]
+    found = _Guess(
+        np.empty((count, store.z.shape[1])),
+        np.empty((count, store.p.shape[1])),
+        np.empty((count, width)),
+        np.empty((count, d, width)),
+        np.empty(count),
+    )
+    out = found.z, found.p, found.place, found.plane, found.length
+    known = store.z, store.p, store.frame, store.rows
+    bend_edges(*known, metric, ends, target.t, held, flat, out)
+    return found
 
 
 def _beside_sides(fabric: Fabric, target: Places, least: float) -> Tried:
@@ -171,7 +185,8 @@ def _beside_sides(fabric: Fabric, target: Places, least: float) -> Tried:
     setting, store, d, mark = fabric.setting, fabric.vertices, fabric.dimension, target.mark
     guess = _guess(fabric, target)
     z, p, place, plane = guess.z, guess.p, guess.place, guess.plane
-    freely = on_curves(fabric, mark, z, p, place, plane, guess.length, guess.first)
+    first = fabric.end(target.ends, 0, mark)
+    freely = on_curves(fabric, mark, z, p, place, plane, guess.length, first)
     found = np.zeros(len(z), bool)
     for k in range(d):
         free = freely.p[:, setting.free[k]]
@@ -184,56 +199,46 @@ def _beside_sides(fabric: Fabric, target: Places, least: float) -> Tried:
             continue
         near_z, near_p = z[own], p[own].copy()
         near_p[:, setting.free[k]] = there[own]
-        end = guess.first.take(own)
+        end = first.take(own)
         row = plane[own][:, :, plane.shape[2] - d + k]
         end = replace(end, slopes=np.concatenate([end.slopes, row[:, None]], axis=1))
         place[own] = embed(setting, near_z, near_p)
         given = near_z, near_p, place[own], plane[own], guess.length[own]
         pinned = on_curves(fabric, mark | FacetMark.SIDE << 2 * k, *given, end)
         z[own], p[own], found[own] = pinned.z, pinned.p, pinned.found
-    return _accept(fabric, target, Pinned(z, p, found), place, plane)
+    return _accept(fabric, target, Pinned(z, p, found), guess)
 
 
-def _accept(
-    fabric: Fabric,
-    target: Places,
-    at: Corrected | Pinned,
-    place: Float[np.ndarray, "n coordinates"],
-    plane: Float[np.ndarray, "n d coordinates"],
-) -> Tried:
+def _accept(fabric: Fabric, target: Places, at: Corrected | Pinned, guess: _Guess) -> Tried:
     """Those vertices on edges that are close to where they were looked for, and of the index."""
     lowest, mark = target.lowest, target.mark
-    found = _is_close(fabric, target, at, place)
+    found = _are_close(fabric, target, at, guess)
     if isinstance(at, Corrected):
         found &= at.index == lowest
-        vertices = free_vertices(fabric.setting, at if found.all() else at.take(found))
-    else:
-        if mark & FacetMark.CROSSING:
-            lowest = fabric.vertices.index[target.ends].max(axis=1)
-        found = of_index(fabric, mark, at, found, lowest)
-        vertices = vertices_at(fabric, mark, at, found, lowest, plane)
+        return found, free_vertices(fabric.setting, at if found.all() else at.take(found))
+    if mark & FacetMark.CROSSING:
+        lowest = fabric.vertices.index[target.ends].max(axis=1)
+    found = of_index(fabric, mark, at, found, lowest)
+    vertices = vertices_at(fabric, mark, at, found, lowest, guess.plane)
     way = np.subtract(*(fabric.vertices.place[target.ends[:, side]] for side in (1, 0)))
     good = _along(replace(fabric, vertices=vertices), mark, way[found])
     found[found] = good
     return found, vertices if good.all() else vertices.take(np.flatnonzero(good))
 
 
-def _is_close(
-    fabric: Fabric,
-    target: Places,
-    at: Corrected | Pinned,
-    place: Float[np.ndarray, "n coordinates"],
-) -> ItemFlags:
-    """Which points lie close to their places, between the ends of their edges and in the box."""
-    first, second = (fabric.vertices.place[target.ends[:, side]] for side in range(2))
-    length = np.linalg.norm(second - first, axis=1)
-    here = embed(fabric.setting, at.z, at.p)
-    close = at.found & (np.linalg.norm(here - place, axis=1) <= REACH * length)
-    for end, part in ((first, target.t), (second, 1.0 - target.t)):
-        close &= np.linalg.norm(here - end, axis=1) <= (part + EXCESS) * length
-    free = at.p[:, fabric.setting.free]
+def _are_close(fabric: Fabric, target: Places, at: Corrected | Pinned, guess: _Guess) -> ItemFlags:
+    """Which points lie close to their places, between the ends of their edges and in the box.
+
+    And, where tangent spaces are known, whether the edges lead along these.
+    """
+    store, free = fabric.vertices, at.p[:, fabric.setting.free]
     inside = (free >= fabric.box[0] - IN_BOX) & (free <= fabric.box[1] + IN_BOX)
-    return np.asarray(close & inside.all(axis=1))
+    found = at.found & inside.all(axis=1)
+    none = np.zeros((len(found), 0, 0))
+    told = at.z, at.p, at.frames if isinstance(at, Corrected) else none
+    edges, near = (_metric(fabric), target.ends, target.t), (guess.place, guess.length)
+    check_edges(store.z, store.p, *edges, near, (REACH, EXCESS, ALONG), told, found)
+    return found
 
 
 def _orthogonally(fabric: Fabric, target: Places, *, rough: bool) -> Tried:
@@ -244,8 +249,8 @@ def _orthogonally(fabric: Fabric, target: Places, *, rough: bool) -> Tried:
     if mark == 0 and rough:
         at = correct_between(fabric.setting, *near)
     else:
-        at = on_curves(fabric, mark, *near, guess.first)
-    return _accept(fabric, target, at, guess.place, guess.plane)
+        at = on_curves(fabric, mark, *near, fabric.end(target.ends, 0, mark))
+    return _accept(fabric, target, at, guess)
 
 
 def on_curves(

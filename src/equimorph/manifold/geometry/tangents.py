@@ -1,7 +1,6 @@
 """Tangent spaces of the set at its vertices, folds to second order, and how far edges are off."""
 
 from dataclasses import dataclass
-from functools import cached_property
 from itertools import combinations
 
 import numpy as np
@@ -180,36 +179,17 @@ class Cubics:
     first: Ends
     second: Ends
 
-    @cached_property
-    def _along(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        chord = self.second.place - self.first.place
-        return chord, self.first.along(chord), self.second.along(chord)
-
     @property
     def error(self) -> Float[np.ndarray, " edges"]:
         """How far the curves are from their chords."""
-        chord, a, b = self._along
-        off_a = np.einsum("ed,edc->ec", a, self.first.rows) - chord
-        off_b = np.einsum("ed,edc->ec", b, self.second.rows) - chord
+        chord = self.second.place - self.first.place
+        off_a, off_b = (
+            np.einsum("ed,edc->ec", end.along(chord), end.rows) - chord
+            for end in (self.first, self.second)
+        )
         middle = np.linalg.norm(off_a - off_b, axis=1) / 8.0
         slope = np.maximum(np.linalg.norm(off_a, axis=1), np.linalg.norm(off_b, axis=1))
         return np.asarray(np.maximum(middle, S_SHAPE * slope))
-
-    def step(
-        self,
-        frames: tuple[Frames, Frames],
-        chord: Float[np.ndarray, "edges full"],
-        t: Float[np.ndarray, " edges"],
-    ) -> Float[np.ndarray, "edges full"]:
-        """Step from the chords, changes of z and of the scaled parameters, to the curves at t.
-
-        `frames` are those at both ends.
-        """
-        _, a, b = self._along
-        off_a = np.einsum("ed,edf->ef", a, frames[0]) - chord
-        off_b = np.einsum("ed,edf->ef", b, frames[1]) - chord
-        share = t[:, None]
-        return np.asarray(share * (1 - share) ** 2 * off_a - share**2 * (1 - share) * off_b)
 
 
 def best_corners(

@@ -22,6 +22,7 @@ from equimorph.arrays import (
     VertexNumbers,
 )
 from equimorph.linalg.graphs import components
+from equimorph.manifold.geometry.facet_kernels import join_cells
 from equimorph.manifold.geometry.kernels import orient, orient_facets, walk_chains
 from equimorph.manifold.geometry.simplices import volumes
 
@@ -52,11 +53,12 @@ class Adjacency:
     @cached_property
     def beside(self) -> Int[np.ndarray, "F most"]:
         """Cells that have each facet, −1 where there are fewer than of others."""
-        number = self.cell_facets.ravel()
-        order, first = np.argsort(number, kind="stable"), np.cumsum(self.counts) - self.counts
         out = np.full((len(self.facets), int(self.counts.max(initial=1))), -1)
-        row = number[order]
-        out[row, np.arange(len(order)) - first[row]] = order // self.cell_facets.shape[1]
+        number, cells = self.cell_facets.ravel(), self.cell_facets.shape[1]
+        # of values assigned to one entry the last one stays: the first cell of each facet
+        out[number[::-1], 0] = np.arange(len(number))[::-1] // cells
+        after = np.arange(len(self.across)) - np.searchsorted(self.across, self.across)
+        out[self.across, 1 + after] = self.places[:, 1] // cells
         return out
 
     @property
@@ -123,38 +125,8 @@ def count_corners(chosen: VertexFlags, cells: Int[np.ndarray, "n corners"]) -> I
 
 def adjacency(cells: Cells) -> Adjacency:
     """Facets and links of segments, triangles or tetrahedra."""
-    corners = cells.shape[1]
     base = int(cells.max(initial=0)) + 1
-    keys = np.stack([keys_of(np.delete(cells, k, axis=1), base) for k in range(corners)], axis=1)
-    order, starts = _groups(keys.ravel())
-    counts = np.diff(starts)
-    number = np.repeat(np.arange(len(counts)), counts)
-    of_cells = np.empty(keys.size, int)
-    of_cells[order] = number
-    same = np.flatnonzero(np.diff(number) == 0)
-    return Adjacency(
-        rows_of(keys.ravel()[order[starts[:-1]]], base, corners - 1),
-        counts,
-        of_cells.reshape(-1, corners),
-        number[same],
-        np.stack([order[same], order[same + 1]], axis=1),
-    )
-
-
-def _groups(keys: Items) -> tuple[Items, Int[np.ndarray, " starts"]]:
-    """Order of numbers, equal ones as they come, and where each group of these starts, and ends.
-
-    Most groups have at most two: then the fast sort, which may exchange equal ones, is put right.
-    """
-    order = np.argsort(keys)
-    first = np.flatnonzero(np.diff(keys[order], prepend=-1) > 0)
-    starts = np.append(first, len(keys))
-    if (np.diff(starts) > 2).any():
-        return np.argsort(keys, kind="stable"), starts
-    pairs = first[np.diff(starts) == 2]
-    ends = np.sort(order[pairs[:, None] + np.arange(2)], axis=1)
-    order[pairs], order[pairs + 1] = ends.T
-    return order, starts
+    return Adjacency(*join_cells(np.ascontiguousarray(cells, int), base))
 
 
 def flags_of(facets: Int[np.ndarray, "F d"], chosen: Facets) -> Bool[np.ndarray, " F"]:
