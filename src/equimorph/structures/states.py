@@ -9,7 +9,7 @@ from typing import Any, Protocol, overload, runtime_checkable
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
-from equimorph.arrays import Flags, Float, Int, Lanes, Parameters, Values
+from equimorph.arrays import Determinants, Flags, Float, Int, Lanes, Parameters, Values
 from equimorph.errors import InputError, MissingError
 from equimorph.model import Descriptor, Drawing, names_of, position
 from equimorph.structures.contract import Structure
@@ -108,6 +108,13 @@ class States(Tabular):
     def index(self) -> Int[np.ndarray, " lanes"]:
         """Negative eigenvalues of the constrained Hessian; 0 is stable."""
         return self.structure.index(self.z, self.p)
+
+    @cached_property
+    def inertia(self) -> tuple[Int[np.ndarray, " lanes"], Determinants]:
+        """Index, counted at these states, and determinant of F_z, of one factorisation."""
+        nothing = np.zeros((len(self.z), 0, self.p.shape[1]))
+        told = self.structure.respond(self.z, self.p, nothing)
+        return told.index, told.determinant
 
     @property
     def stable(self) -> "States":

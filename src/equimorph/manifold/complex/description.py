@@ -345,8 +345,7 @@ def contradictions(
     At folds, and where sheets cross, the eigenvalues that vanish may count or not.
     """
     structure, singular = points.structure, are_singular(kinds)
-    low = structure.index(points.z, points.p)
-    high = low.copy()
+    low, high = points.inertia[0].copy(), points.inertia[0].copy()
     z, p = points.z[singular], points.p[singular]
     nothing, shift = np.zeros((len(z), 0, structure.size)), np.full(len(z), VANISHING)
     for bound, sign in ((low, -1.0), (high, 1.0)):

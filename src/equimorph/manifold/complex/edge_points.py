@@ -238,7 +238,7 @@ def _are_close(fabric: Fabric, target: Places, at: Corrected | Pinned, guess: _G
     told = at.z, at.p, at.frames if isinstance(at, Corrected) else none
     edges, near = (_metric(fabric), target.ends, target.t), (guess.place, guess.length)
     check_edges(store.z, store.p, *edges, near, (REACH, EXCESS, ALONG), told, found)
-    return found
+    return np.asarray(found)
 
 
 def _orthogonally(fabric: Fabric, target: Places, *, rough: bool) -> Tried:

@@ -88,8 +88,7 @@ def hidden_islands(eset: EquilibriumSet) -> States:
 def _of_cells(eset: EquilibriumSet) -> _Patches:
     """Cells with the vertices across their sides, off folds and crossings, where much varies."""
     vertices, singular = eset.points, are_singular(eset.kinds)
-    known = np.zeros((len(singular), 2))
-    known[~singular] = determinants(eset.structure, vertices.z[~singular], vertices.p[~singular])
+    known = np.where(singular[:, None], 0.0, vertices.inertia[1])
     plain = np.flatnonzero(~singular[eset.cells].any(axis=1))
     around = np.concatenate([eset.cells, _across(eset.cells, eset.adjacency)], axis=1)[plain]
     unit, power = known[around[:, 0]].T

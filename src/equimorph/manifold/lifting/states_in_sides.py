@@ -4,11 +4,11 @@ See docs/decisions.md, "Sides are searched like the box".
 """
 
 from collections.abc import Iterator
-from itertools import combinations, product
+from itertools import combinations, groupby, product
 
 import numpy as np
 
-from equimorph.arrays import Flags, Int, Place
+from equimorph.arrays import Flags, Int, Lanes, Parameters, Place
 from equimorph.equilibria.critical import Critical, null_border
 from equimorph.equilibria.settle import Guards, free_directions, settle
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
@@ -18,6 +18,8 @@ from equimorph.tolerances import SAME_SOLUTION
 
 ITERATIONS = 40
 """Of Newton's method from random guesses, at most."""
+Face = tuple[Int[np.ndarray, " k"], Place]
+"""Parameters that are constant on a side, an edge or a corner, and their values."""
 
 
 def states_in_sides(eset: EquilibriumSet, count: int, generator: np.random.Generator) -> States:
@@ -27,16 +29,13 @@ def states_in_sides(eset: EquilibriumSet, count: int, generator: np.random.Gener
     side, however little, meets the side; where it is as narrow there, an edge or a corner of it.
     """
     structure, free, box = eset.structure, eset.setting.free, eset.box
-    faces = list(_faces(box))
-    each = -(-count // len(faces))
+    each = -(-count // sum(1 for _ in _faces(box)))
     found = []
-    for held, values in faces:
-        place = generator.uniform(box.lower, box.upper, (each, len(free)))
-        place[:, held] = values
-        p = eset.setting.parameters(place)
-        moving = np.delete(free, held)
-        directions = free_directions(structure, moving, each) if len(moving) else None
-        guess, guards = structure.sample(p, generator), Guards(iterations=ITERATIONS)
+    for held, faces in groupby(_faces(box), lambda face: len(face[0])):
+        starts = [_guesses(eset, face, each, generator) for face in faces]
+        p, guess, moving = (np.concatenate(column) for column in zip(*starts, strict=True))
+        directions = free_directions(structure, moving, len(p)) if held < len(free) else None
+        guards = Guards(iterations=ITERATIONS)
         at = settle(structure, guess, p, directions, guards=guards, frames=False)
         good = at.found & box.holds(at.p[:, free])
         good[good] = are_feasible(eset.constraints, at.z[good], at.p[good])
@@ -44,8 +43,19 @@ def states_in_sides(eset: EquilibriumSet, count: int, generator: np.random.Gener
     return join_states(structure, found)
 
 
-def _faces(box: Box) -> Iterator[tuple[Int[np.ndarray, " k"], Place]]:
-    """Sides, edges and corners of a box: parameters that are constant there, and their values."""
+def _guesses(
+    eset: EquilibriumSet, face: Face, count: int, generator: np.random.Generator
+) -> tuple[Parameters, Lanes, Int[np.ndarray, "lanes k"]]:
+    """Random parameters on a face, guesses over them, and the parameters that vary there."""
+    (held, values), box, free = face, eset.box, eset.setting.free
+    place = generator.uniform(box.lower, box.upper, (count, len(free)))
+    place[:, held] = values
+    p = eset.setting.parameters(place)
+    return p, eset.structure.sample(p, generator), np.tile(np.delete(free, held), (count, 1))
+
+
+def _faces(box: Box) -> Iterator[Face]:
+    """Sides, edges and corners of a box, those of one kind after the other."""
     sides = list(zip(box.lower, box.upper, strict=True))
     for count in range(1, len(sides) + 1):
         for held in combinations(range(len(sides)), count):
