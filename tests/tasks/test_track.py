@@ -10,6 +10,7 @@ from scipy.optimize import brentq
 import equimorph as em
 from equimorph.errors import InputError
 from equimorph.structures import State
+from oracles.polynomial import Polynomial
 from typecheck import unchecked
 
 LOAD = (1 - 0.8 / np.cos(0.62)) * np.sin(0.62)
@@ -243,3 +244,35 @@ def test_descriptors_with_names_of_columns_come_back(start, tmp_path, name):
             assert np.array_equal(back.progress, schedule.progress)
             assert np.array_equal(back.margins, schedule.margins)
             assert np.array_equal(back.values, schedule.values)
+
+
+DIPPING = Polynomial(
+    lambda x, a, b, m, d: (x - m) ** 4 * (1 / 12) - d * (x - m) ** 2 * 0.5 - (a + b) * x,
+    1,
+    ("a", "b", "m", "d"),
+)
+"""E'' = (x − m)² − d: stability is lost between x = m ∓ √d alone."""
+
+
+@pytest.mark.parametrize("way", ["one leg", "many legs", "spare actuators"])
+def test_no_narrow_loss_of_stability_is_passed(way):
+    """16 of 510 random motions arrived across an unstable stretch between two of their rows."""
+    draw = np.random.default_rng(4)
+    place = DIPPING.descriptor("0")
+    for _ in range(12):
+        m, d = draw.uniform(-0.5, 0.5), float(draw.choice([-1.0, 1.0]) * 10 ** draw.uniform(-7, -3))
+        x, goal = m - draw.uniform(0.2, 0.9), m + draw.uniform(0.05, 0.9)
+        force = (x - m) ** 3 / 3 - d * (x - m)
+        start = DIPPING.state(x, a=force, m=m, d=d)
+        count = 20 if way == "many legs" else 1
+        legs = [{place: x + (goal - x) * k / count} for k in range(1, count + 1)]
+        actuators = ["a", "b"] if way == "spare actuators" else ["a"]
+        with unchecked():
+            found = em.track(start, legs, actuators=actuators)
+        if d < 0.0:
+            assert found.arrived
+            continue
+        assert found.failure == "snap-through"
+        edge = m - np.sqrt(d)
+        assert found.path.end.state.z[0] == pytest.approx(edge, abs=1e-8)
+        assert found.last_good / count == pytest.approx((edge - x) / (goal - x), abs=1e-8)

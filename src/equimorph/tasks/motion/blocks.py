@@ -16,6 +16,7 @@ from equimorph.tasks.motion.course import (
     Course,
     correct_onto_targets,
     linearise,
+    may_graze,
     shortest_change,
 )
 from equimorph.tasks.route import FINE
@@ -100,7 +101,8 @@ def follow_blocks(
 
     States at the corners ahead are predicted along the tangents and corrected, all of a block at
     once. Those that move by less than a quarter of the predicted way count, up to the first that is
-    unstable, violates a constraint or is far from the one before, which is approached by halves.
+    unstable, violates a constraint, perhaps on the way, or is far from the one before, which is
+    approached by halves.
     """
     structure = course.structure
     z, p, times = [start.z[None]], [start.p[None]], [np.array([time])]
@@ -150,6 +152,9 @@ def _block(
         fine = states.index == 0
         fine &= are_feasible(within, states.z, states.p)
         states = states[: _leading(fine)]
+    if len(states):
+        z, p = z[: len(states) + 1], p[: len(states) + 1]
+        states = states[: _leading(~may_graze(within, States(structure, z, p)))]
     return Stretch(states, ahead[: len(states)])
 
 

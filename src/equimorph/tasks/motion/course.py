@@ -6,21 +6,25 @@ from typing import Any
 
 import numpy as np
 
-from equimorph.arrays import Float, Int, Lanes, Parameters
+from equimorph.arrays import Flags, Float, Int, Lanes, Parameters
 from equimorph.equilibria import Leg
-from equimorph.equilibria.legs import replace_parameters
+from equimorph.equilibria.legs import ON_BOUND, replace_parameters
 from equimorph.equilibria.point_conditions import Values as TargetValues
 from equimorph.equilibria.sensitivity import answers, slopes_along
 from equimorph.equilibria.settle import Guards, Held, Settled, free_directions, settle
 from equimorph.errors import InputError
+from equimorph.manifold.lookup.exact_states import exact_states
 from equimorph.model import Constraint, Descriptor, position
-from equimorph.structures import State, Structure, value_of
+from equimorph.structures import State, States, Structure, join_states, value_of
+from equimorph.tasks.distances import step_lengths
 
 RATE = 1e-4
 """Share of a leg over which the rates of curves are measured."""
 
 EXACT = 1e-10
 """Last correction, in the metric and scaled parameters, of a point that counts as found."""
+TINY = 1e-300
+"""Keeps quotients finite where two states are one."""
 GUARDS = Guards(iterations=12, longest=0.3, converged=EXACT)
 """Limits of corrections onto targets."""
 
@@ -206,3 +210,26 @@ def correct_onto_targets(
     values = TargetValues(tuple(each.function for each in descriptors), targets)
     directions = free_directions(structure, free, len(targets))
     return settle(structure, z, p, directions, [values], GUARDS, Held())
+
+
+def may_graze(within: Sequence[Constraint], states: States) -> Flags:
+    """Whether constraints may be violated inside the steps of a motion, by curvature of its values.
+
+    Between two values the curve bulges by an eighth of its curvature times the squared step; four
+    times as much is doubted. A single step shows its curvature by the state half-way.
+    """
+    if len(states) == 2:
+        structure, mean = states.structure, [0.5 * (a[:1] + a[1:]) for a in (states.z, states.p)]
+        z, good, _ = exact_states(structure, *mean)
+        middle = States(structure, z, mean[1])
+        both = may_graze(within, join_states(structure, (states[:1], middle, states[1:])))
+        return np.array([both.any() or not good[0]])
+    steps = step_lengths(states)
+    doubt, lengths = np.zeros(len(steps), bool), np.maximum(steps, TINY)
+    for constraint in within:
+        excess = constraint.excess(states.z, states.p)
+        room, slope = -np.maximum(excess[:-1], excess[1:]), np.diff(excess) / lengths
+        bend = 2.0 * np.abs(np.diff(slope)) / (lengths[:-1] + lengths[1:])
+        bend = np.maximum(np.append(bend, bend[-1]), np.insert(bend, 0, bend[0]))
+        doubt |= (room > ON_BOUND * constraint.size) & (room < 0.5 * bend * lengths**2)
+    return doubt

@@ -16,7 +16,13 @@ from equimorph.equilibria.settle import distances
 from equimorph.model import Constraint
 from equimorph.structures import State, join_states
 from equimorph.tasks.motion.blocks import Stretch
-from equimorph.tasks.motion.course import Course, correct_onto_targets, linearise, shortest_change
+from equimorph.tasks.motion.course import (
+    Course,
+    correct_onto_targets,
+    linearise,
+    may_graze,
+    shortest_change,
+)
 
 TOLERANCE = 1e-8
 """Error of a step, in the metric and scaled parameters."""
@@ -79,7 +85,7 @@ def follow_redundant(
         step = min(step, corner - here.time)
         last = step >= corner - here.time
         there, error = _step(course, here, step, corner if last else here.time + step)
-        why = _fault(course, here, there, error, within, limits)
+        why = _fault(course, (*track[-2:], there), error, within, limits)
         if not why:
             here = replace(there, held=_held_actuators(course, there, limits))
             track.append(here)
@@ -149,23 +155,23 @@ def _step(course: Course, here: _Here, step: float, time: float) -> tuple[_Here,
 
 def _fault(
     course: Course,
-    here: _Here,
-    there: _Here,
+    last: tuple[_Here, ...],
     error: float,
     within: tuple[Constraint, ...],
     limits: Limits,
 ) -> str:
-    """Why a step cannot be taken, or nothing."""
-    if not error <= TOLERANCE:
-        return "error"
-    structure = course.structure
-    if distances(structure, there.z, there.p, here.z, here.p)[0] > LARGEST:
+    """Why a step cannot be taken, or nothing; `last`: up to two states before it, and its end."""
+    (here, there), structure = last[-2:], course.structure
+    far = distances(structure, there.z, there.p, here.z, here.p)[0] > LARGEST
+    if far or not error <= TOLERANCE:
         return "long"
     if structure.index(there.z, there.p)[0] != 0:
         return "unstable"
     for constraint in within:
         if constraint.excess(there.z, there.p)[0] > 0.0:
             return str(constraint)
+    if may_graze(within, join_states(structure, last))[-1]:
+        return "grazing"
     for place, (low, high) in limits.items():
         if place not in there.held and not low - ON <= there.p[0, place] <= high + ON:
             return f"limit {place}"
@@ -213,7 +219,7 @@ def _end(course: Course, track: list[_Here], why: str, limits: Limits) -> Event:
         upper = abs(here.p[0, place] - high) < abs(here.p[0, place] - low)
         return Event(EventKind.LIMIT, state, here.time, None, f"{name} {'<=' if upper else '>='} "
                      f"{high if upper else low:g}")  # fmt: skip
-    if why not in ("error", "long", "unstable"):
+    if why not in ("long", "unstable", "grazing"):
         return Event(EventKind.CONSTRAINT, state, here.time, None, why)
     middle = track[len(track) // 2 if len(track) > 2 else 0]
     margins = join_states(course.structure, (here, track[0], middle)).margin

@@ -1,7 +1,10 @@
-"""`track`: actuators that lead descriptors along given targets while loads move."""
+"""`track`: actuators that lead descriptors along given targets while loads move.
+
+See docs/decisions.md, "Motions with targets are bounded by their margin".
+"""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Literal
 
@@ -9,11 +12,11 @@ import numpy as np
 
 from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Float, Lanes, Parameters, Values
-from equimorph.equilibria import Event, Leg, Path, Waypoint, check_start, lift
+from equimorph.equilibria import Event, EventKind, Leg, Path, Waypoint, check_start, lift
 from equimorph.equilibria.trace_options import VIOLATIONS
 from equimorph.errors import InputError
 from equimorph.model import Constraint, Descriptor, Schedule, position
-from equimorph.structures import State, States
+from equimorph.structures import State, States, margin_of
 from equimorph.tasks.motion.between_rows import BetweenRows
 from equimorph.tasks.motion.blocks import DENSE, path_by_blocks, same_descriptors, stable_path
 from equimorph.tasks.motion.course import Course, actuator_bounds
@@ -141,7 +144,7 @@ def track(  # the knobs of the public face, all by keyword
     """Follow targets S*(t) of descriptors with at least as many actuators, while loads may move.
 
     ``S_a ȧ = Ṡ* − S_l l̇``, corrected onto the set at every step: an error-controlled continuation
-    in pseudo-arclength, first with coarse steps, and again with fine ones before it is accepted.
+    in pseudo-arclength, first with coarse steps, and again with fine ones.
     Many close targets are corrected side by side. With more actuators than targets the shortest
     motion of the actuators is taken at every moment, in their scales; one that meets its limit is
     held there as long as the remaining ones suffice.
@@ -233,24 +236,38 @@ class _Motion:
         return Course.of(self.start, self.legs, self.names)
 
     def path(self) -> Path:
-        """Follow the motion by the method that suits it."""
-        every = (*self.within, *self.bounds)
+        """Follow the motion by the method that suits it, as far as it is stable.
+
+        Stability is one of the bounds, because a loss and a gain between two states leave the index
+        of both as it is.
+        """
+        stable = margin_of(self.start.structure) >= 0.0
+        path = self._path((*self.within, *self.bounds, stable))
+        end = path.end
+        if end.kind in VIOLATIONS and end.detail == str(stable):
+            lost = replace(end, kind=EventKind.CRITICAL, detail="")
+            path = replace(path, events=(*path.events[:-1], lost))
+        return path
+
+    def _path(self, every: tuple[Constraint, ...]) -> Path:
         first = self.legs[0](0.0) if callable(self.legs[0]) else self.legs[0]
         if sum(isinstance(key, Descriptor) for key in first) < len(self.names):
-            return self._redundant_path()
+            return self._redundant_path(every)
         if len(self.legs) >= DENSE and same_descriptors(self.legs):
             check_start(self.start, every)
             return path_by_blocks(self.course, self.start, every)
         freed = [_free_actuators(leg, self.names) for leg in self.legs]
         path = lift(self.start, freed, within=every)
-        return lift(self.start, freed, within=every, options=FINE) if path.arrived else path
+        lost = path.end.kind == EventKind.LOST
+        return path if lost else lift(self.start, freed, within=every, options=FINE)
 
-    def _redundant_path(self) -> Path:
+    def _redundant_path(self, every: tuple[Constraint, ...]) -> Path:
         """The shortest motion of more actuators than targets."""
         course, parameters = self.course, self.start.structure.parameters
-        check_start(self.start, (*self.within, *self.bounds))
+        check_start(self.start, every)
         places = {position(parameters, name): ends for name, ends in self.limits.items()}
-        found = follow_redundant(course, self.start, self.within, places)
+        held = tuple(each for each in every if each not in self.bounds)
+        found = follow_redundant(course, self.start, held, places)
         return stable_path(found.stretch.states, found.stretch.times, found.end)
 
     def compromise(self, path: Path) -> FollowedOptimum:
