@@ -92,3 +92,35 @@ def test_pairs_of_events_in_first_steps_are_separated_in_many_lanes():
     assert many.events.lane.tolist() == np.repeat(np.arange(lanes), 2).tolist()
     places = (many.events.states["a"] - many.events.states["g"]).reshape(lanes, 2)
     assert places == pytest.approx(np.tile([-1e-3, 1e-3], (lanes, 1)), abs=1e-10)
+
+
+HYSTERESES = Polynomial(
+    lambda x, y, a, c, d, k, m: (
+        c * (x**4 * 0.25 - d * x**2 * 0.5 - a * x) + k * 0.5 * (y - m * x**2) ** 2
+    ),
+    2,
+    ("a", "c", "d", "k", "m"),
+)
+"""x³ − d x = a: two folds at x = ∓√(d/3), a = ±2 (d/3)^1.5."""
+
+
+@pytest.mark.parametrize(
+    ("lanes", "seed"), [(1500, 3), pytest.param(5000, 0, marks=pytest.mark.slow)]
+)
+def test_no_pair_of_folds_hides_at_the_end_of_many_lanes(lanes, seed):
+    """Goals close before or behind the first fold: 27 of 5000 lanes arrived behind both of them."""
+    draw = np.random.default_rng(seed)
+    d, c = 10.0 ** draw.uniform(-6.0, -1.0, lanes), draw.uniform(0.2, 5.0, lanes)
+    k, m = draw.uniform(0.5, 4.0, lanes), draw.uniform(-1.0, 1.0, lanes)
+    edge, fold = np.sqrt(d / 3.0), 2.0 * (d / 3.0) ** 1.5
+    x = -edge - 10.0 ** draw.uniform(-1.5, 0.3, lanes)
+    close = fold * draw.choice([-1.0, 1.0], lanes) * 10.0 ** draw.uniform(-3.0, -0.5, lanes)
+    far = 10.0 ** draw.uniform(-6.0, 0.0, lanes)
+    goal = fold + np.where(draw.random(lanes) < 0.5, far, close)
+    starts = States(HYSTERESES, np.stack([x, m * x**2], 1), np.stack([x**3 - d * x, c, d, k, m], 1))
+    many = em.lift(starts, {"a": goal})
+    assert (many.kind == np.where(goal > fold, "fold", "arrived")).all()
+    u = many.states.z[:, 0]
+    assert (u <= -edge * (1.0 - 1e-6)).all()
+    alone = [em.lift(starts[i], {"a": goal[i]}).end.kind for i in range(0, lanes, 50)]
+    assert alone == many.kind[::50].tolist()

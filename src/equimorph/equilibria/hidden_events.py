@@ -11,7 +11,14 @@ import numpy as np
 from equimorph.arrays import Flags, Float, Lanes, Numbers, Parameters, Some, Values
 from equimorph.equilibria.curves import Curve, dual
 from equimorph.equilibria.events import Events, locate_all
-from equimorph.equilibria.inside_steps import AT_EVENT, CLOSE, look_inside, probe_at, step_between
+from equimorph.equilibria.inside_steps import (
+    AT_EVENT,
+    CLOSE,
+    look_inside,
+    probe_at,
+    step_between,
+    within_ends,
+)
 from equimorph.equilibria.steps import Front, Points, least_inside
 from equimorph.equilibria.trace import Traces
 from equimorph.equilibria.trace_options import EventCode, TraceOptions
@@ -21,6 +28,7 @@ AT_ONCE = 1024
 """Points, or lanes, that are evaluated together: they stay in the cache."""
 Counts = Numbers
 
+NOT_LOCATED = "a hidden pair of events could not be located"
 REGULAR_ENDS = (EventCode.ARRIVED, EventCode.RETURNED, EventCode.CONSTRAINT)
 
 
@@ -32,7 +40,7 @@ def with_hidden_events(curve: Curve, z: Lanes, outcome: Traces, options: TraceOp
     points = recorded_points(curve, z, outcome)
     inside = hidden_events(curve, points, options)
     last_ones = _before_ends(curve, points, outcome)
-    hidden = Events.join([inside, last_ones], z.shape[1])
+    hidden = within_ends(Events.join([inside, last_ones], z.shape[1]))
     if len(hidden.code) == 0:
         return outcome
     stops = np.flatnonzero((hidden.code & options.stops != 0) | ~hidden.found)
@@ -62,7 +70,7 @@ def with_hidden_events(curve: Curve, z: Lanes, outcome: Traces, options: TraceOp
 
 def _why(end: Events, i: int) -> str:
     if not end.found[i]:
-        return "a hidden pair of events could not be located"
+        return NOT_LOCATED
     touching = end.index[i, 0] == end.index[i, 1] and end.code[i] == EventCode.FOLD
     return "the path touches a fold and goes on" if touching else ""
 

@@ -89,13 +89,22 @@ def inside_spans(curve: Curve, span: Span, options: TraceOptions) -> Events:
     return look_inside(curve, span.lane[open_], ends, span.first[open_], options)
 
 
-def inside_only_steps(curve: Curve, bracket: Bracket, options: TraceOptions) -> list[Events]:
-    """Events inside steps that are the only one of their lane, without a point before them.
+def within_ends(hidden: Events) -> Events:
+    """Hidden events, those beyond an end of the curve not found.
 
-    The determinant at the middle of the step shows where to search.
+    Two turns there mean that the step ran through the end more than once, so that its arrival may
+    be another than the first.
+    """
+    return replace(hidden, found=hidden.found & (hidden.t >= 0.0) & (hidden.t <= 1.0))
+
+
+def inside_last_steps(curve: Curve, bracket: Bracket, options: TraceOptions) -> list[Events]:
+    """Events inside the last steps of lanes, which no later determinant shows.
+
+    The determinant at the middle of the step tells whether it has to be searched.
     """
     ends = bracket.before.index == bracket.after.index
-    ends &= (bracket.travelled == 0.0) & (bracket.what & options.stops != 0)
+    ends &= bracket.what & options.stops != 0
     if not (curve.folds_change_index and options.look_inside and ends.any()):
         return []
     step = bracket.take(np.flatnonzero(ends))
@@ -105,7 +114,8 @@ def inside_only_steps(curve: Curve, bracket: Bracket, options: TraceOptions) -> 
     values = np.stack([determinant(here, *at) for at in places])
     some = np.flatnonzero(may_vanish(in_units(values, values[0, :, 1])))
     step, unknown = step.take(some), np.full(len(some), np.nan)
-    span = Span(step.lanes, step.before, step.after, np.zeros(len(some)), step.step, unknown)
+    start, stop = step.travelled, step.travelled + step.step
+    span = Span(step.lanes, step.before, step.after, start, stop, unknown)
     return [inside_spans(curve, span, options)]
 
 

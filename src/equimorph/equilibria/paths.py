@@ -10,12 +10,13 @@ from equimorph.arrays import Float, Int, Lanes, Numbers, Parameters, Some, Value
 from equimorph.equilibria.critical import criticality
 from equimorph.equilibria.curves import Curve, ParameterLine
 from equimorph.equilibria.hidden_events import (
+    NOT_LOCATED,
     fronts,
     recorded_points,
     with_hidden_events,
     with_multiple_points,
 )
-from equimorph.equilibria.legs import Leg, legs_of, prepare_leg
+from equimorph.equilibria.legs import Leg, Prepared, legs_of, prepare_leg
 from equimorph.equilibria.locate import locate_root
 from equimorph.equilibria.march import UNRESOLVED
 from equimorph.equilibria.steps import Bracket, Points
@@ -119,9 +120,7 @@ def lift_one(
         begun = prepare_leg(here.batch, leg)
         if not begun.curve.weight[0] > 0.0:
             continue
-        outcome = trace(begun.curve, begun.z, within, options, progress=progress)
-        if begun.curve.folds_change_index:
-            outcome = with_hidden_events(begun.curve, begun.z, outcome, options)
+        outcome = _trace_one(begun, within, options, progress)
         outcome = with_multiple_points(begun.curve, begun.z, outcome)
         aside = _vanishing_events(begun.curve, begun.z, outcome)
         pieces.append(_segment(begun.curve, outcome, number, within, aside))
@@ -131,6 +130,23 @@ def lift_one(
     if not pieces:
         raise InputError("`to` must change at least one parameter; got the start itself.")
     return _join(state, pieces)
+
+
+def _trace_one(
+    leg: Prepared,
+    within: tuple[Constraint, ...],
+    options: TraceOptions,
+    progress: Progress | None,
+) -> Traces:
+    """Trace of the only lane of a leg with its hidden events, in finer steps if need be."""
+    while True:
+        outcome = trace(leg.curve, leg.z, within, options, progress=progress)
+        if not leg.curve.folds_change_index:
+            return outcome
+        outcome = with_hidden_events(leg.curve, leg.z, outcome, options)
+        if outcome.why.get(0) != NOT_LOCATED or not options.retries:
+            return outcome
+        options = options.finer()
 
 
 def lift_legs(states: States, within: tuple[Constraint, ...], options: TraceOptions) -> Path | None:

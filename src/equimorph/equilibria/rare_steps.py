@@ -141,11 +141,14 @@ class RareSteps:
         return Span.concatenate([first, self._around(at[what & HIDDEN != 0], move)])
 
     def _around(self, at: Some, move: Advance) -> Span:
-        """The present steps of lanes, together with those before if they start at the least."""
+        """The present steps of lanes, together with those before if the least may lie there."""
         rows, numbers = self.rows, self.rows.numbers[:, at]
         bracket, start = rows.bracket(at, move), numbers[kernels.TRAVELLED]
-        low = np.abs(numbers[kernels.DET]) < kernels.NEAR * np.abs(numbers[kernels.NEW_DET])
-        low &= rows.counts[kernels.KNOWN, at] > 0
+        there = np.abs(numbers[kernels.NEW_DET])
+        last, here = np.abs(numbers[[kernels.DET_OLD, kernels.DET]])
+        rise = (here - last) * numbers[kernels.LENGTH] ** 2
+        rise += (there - here) * numbers[kernels.ARC] ** 2
+        low = (rows.counts[kernels.KNOWN, at] > 0) & ((here < kernels.NEAR * there) | (rise > 0.0))
         turn = numbers[kernels.BEND] * numbers[kernels.ARC]
         behind = start - numbers[kernels.ARC] * np.sinc(turn / np.pi)
         before = bracket.before.with_rows(np.flatnonzero(low), rows.front(at[low], back=1))

@@ -14,7 +14,7 @@ import numpy as np
 from equimorph.arrays import Bool, Lanes, Numbers, Some, Values
 from equimorph.equilibria.curves import Curve
 from equimorph.equilibria.events import Events, locate_all
-from equimorph.equilibria.inside_steps import inside_only_steps
+from equimorph.equilibria.inside_steps import inside_last_steps, within_ends
 from equimorph.equilibria.march import Block, Loss
 from equimorph.equilibria.steps import Points
 from equimorph.equilibria.trace_options import EventCode, TraceOptions
@@ -200,8 +200,9 @@ class _Job:
         block, ledger = self.block, self.ledger
         curve, bracket, options = block.curve, block.rows.events.drain(), block.options
         shown = locate_all(curve, [bracket], block.constraints, options)
-        only = inside_only_steps(curve, bracket, options)
-        events = Events.join([shown, *block.rare.hidden, *only], curve.metric.size)
+        last = inside_last_steps(curve, bracket, options)
+        hidden = [within_ends(each) for each in (*block.rare.hidden, *last)]
+        events = Events.join([shown, *hidden], curve.metric.size)
         block.rare.hidden = []
         again = events.lanes[~events.found]
         if len(again):

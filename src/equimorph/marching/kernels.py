@@ -274,7 +274,7 @@ def judge(index, determinant, numbers, counts, active, smallest, locates, plain)
             continue
         good += 1
         doubtful += (what & BRANCH) != 0
-        if changed == 0 and plain and (_dips(i, NEAR, numbers) or _lowest(i, numbers)):
+        if changed == 0 and plain and (_dips(i, NEAR, numbers) or _passed_least(i, numbers)):
             counts[WHAT, i] |= HIDDEN
             close += 1
         if plain and numbers[TRAVELLED, i] <= numbers[ARC, i] and _hides_early(i, numbers):
@@ -324,50 +324,56 @@ def _turns_twice(old, new, gain, length):
 
 
 @njit(**INLINE)
-def _dips(i, share, numbers):
-    """Whether the determinant may touch zero, or cross it twice, inside a step.
+def _parabola(i, numbers):
+    """Slope here, and half the curvature, of the determinant's size, by its last three values."""
+    before, length, sign = numbers[ARC, i], numbers[LENGTH, i], np.sign(numbers[DET, i])
+    here = sign * numbers[DET, i]
+    rise = (here - sign * numbers[DET_OLD, i]) / before
+    bow = ((sign * numbers[NEW_DET, i] - here) / length - rise) / (before + length)
+    return rise + bow * before, bow
 
-    By the parabola through its values at both ends and at the end of the step before.
-    """
-    before, length = numbers[ARC, i], numbers[LENGTH, i]
-    here, there = numbers[DET, i], numbers[NEW_DET, i]
-    if not (before > 0.0 and here * there > 0.0):
+
+@njit(**INLINE)
+def _dips(i, share, numbers):
+    """Whether the determinant may touch zero, or cross it twice, inside a step."""
+    here, there, length = numbers[DET, i], numbers[NEW_DET, i], numbers[LENGTH, i]
+    if not (numbers[ARC, i] > 0.0 and here * there > 0.0):
         return False
-    sign = np.sign(here)
-    last, here, there = sign * numbers[DET_OLD, i], sign * here, sign * there
-    rise, next_rise = (here - last) / before, (there - here) / length
-    bow = (next_rise - rise) / (before + length)
-    slope = rise + bow * before
+    slope, bow = _parabola(i, numbers)
     # the least value lies inside if the parabola falls at the start and rises at the end
     if not (slope < 0.0 and slope + 2.0 * bow * length > 0.0):
         return False
+    here, there = abs(here), abs(there)
     return here - slope * slope / (4.0 * bow) < share * min(here, there)
 
 
 @njit(**INLINE)
-def _lowest(i, numbers):
-    """Whether the determinant is much smaller here than one step before and at the end."""
-    before, here, there = numbers[DET_OLD, i], numbers[DET, i], numbers[NEW_DET, i]
-    sides = min(abs(before), abs(there))
-    return numbers[ARC, i] > 0.0 and before * there > 0.0 and abs(here) < NEAR * sides
+def _passed_least(i, numbers):
+    """Whether the determinant may touch zero, or cross it twice, just before or after this place.
+
+    It is much smaller here than one step before and at the end, or the parabola is least in the
+    step before, which the end of that did not show.
+    """
+    last, here, there = numbers[DET_OLD, i], numbers[DET, i], numbers[NEW_DET, i]
+    if not (numbers[ARC, i] > 0.0 and last * there > 0.0):
+        return False
+    slope, bow = _parabola(i, numbers)
+    inside = slope > 0.0 and slope < 2.0 * bow * numbers[ARC, i]
+    least = abs(here) - slope * slope / (4.0 * bow) if inside else abs(here)
+    return least < NEAR * min(abs(last), abs(there))
 
 
 @njit(**INLINE)
 def _hides_early(i, numbers):
-    """Whether the determinant may touch zero, or cross it twice, in the first step of a lane.
-
-    By the parabola through its values at the start and after the first and the second step.
-    """
-    before, length = numbers[ARC, i], numbers[LENGTH, i]
-    start, here, there = numbers[DET_OLD, i], numbers[DET, i], numbers[NEW_DET, i]
+    """Whether the determinant may touch zero, or cross it twice, in the first step of a lane."""
+    before, start, here = numbers[ARC, i], numbers[DET_OLD, i], numbers[DET, i]
     if not (before > 0.0 and start * here > 0.0):
         return False
-    start, here, there = abs(start), abs(here), np.sign(here) * there
+    start, here = abs(start), abs(here)
     if start < EARLY_NEAR * here:
         return True
-    rise, next_rise = (here - start) / before, (there - here) / length
-    bow = (next_rise - rise) / (before + length)
-    slope = rise - bow * before
+    slope, bow = _parabola(i, numbers)
+    slope -= 2.0 * bow * before
     if not (slope < 0.0 and slope + 2.0 * bow * before > 0.0):
         return False
     return start - slope * slope / (4.0 * bow) < EARLY_DIP * min(start, here)
