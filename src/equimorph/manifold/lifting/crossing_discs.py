@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import brentq
 
-from equimorph.arrays import Float, ItemValues
+from equimorph.arrays import Float, Items, ItemValues
 from equimorph.equilibria.critical import Critical, null_border
 from equimorph.equilibria.settle import lower_index
 from equimorph.manifold.geometry.exact_points import Aim, Pinned, correct_points, pin_crossings
@@ -30,6 +30,8 @@ HUB = 1e-13
 """Precision of the place of a hub, relative to its chord."""
 NEAR, FAR = 1e-6, 1e-3
 """The same where a second eigenvalue vanishes: target, and largest value that is accepted."""
+VANISHING = 1e-10
+"""Size of an eigenvalue that vanishes at exact crossings; they are below 1e-13 there."""
 SKEW = 1e-4
 """Quadratic over cubic coefficient, a length in the metric, below which it counts as zero."""
 
@@ -144,7 +146,9 @@ def _hub(pairing: Pairing, triangle: int, chord: Chord) -> int | None:
     """Crossing between two crossings at which a fold of a sheet crosses, too.
 
     There the quadratic coefficient of the reduced equation changes its sign; at pitchforks, where
-    it is zero all along, the cubic one does, or its inverse if another eigenvalue vanishes.
+    it is zero all along, the cubic one does. If another eigenvalue vanishes, the index does; the
+    cubic coefficient has a pole there. It may have a zero beside it, where a fold of the side
+    branch ends: that is the same point if it is as near as hubs are precise.
     """
     if chord in pairing.hubs:
         return pairing.hubs[chord]
@@ -156,7 +160,7 @@ def _hub(pairing: Pairing, triangle: int, chord: Chord) -> int | None:
     span, rows = planes(pairing, [triangle]), (way / length)[None, None]
     sense = null_border(setting.structure, z[:1], p[:1])[0]
     quadratic, cubic = _coefficients(pairing, z, p, sense)
-    other = int(np.ptp(lower_index(setting.structure, z, p)))
+    low, high = _negative(pairing, z, p).tolist()
     skew = (np.abs(quadratic) > SKEW * np.abs(cubic)).any()
     found: list[Pinned] = []
     known = {0.0: (z[0], p[0]), 1.0: (z[1], p[1])}
@@ -169,15 +173,26 @@ def _hub(pairing: Pairing, triangle: int, chord: Chord) -> int | None:
             raise _NoCrossingError
         found.append(pinned)
         known[share] = pinned.z[0], pinned.p[0]
-        values = _coefficients(pairing, pinned.z, pinned.p, sense)
-        return float(1.0 / values[1][0] if other else values[1 - skew][0])
+        if low != high:
+            return float(_negative(pairing, pinned.z, pinned.p)[0] - low)
+        return float(_coefficients(pairing, pinned.z, pinned.p, sense)[1 - skew][0])
+
+    def cubic_at(share: float) -> float:
+        test(min(max(share, 0.0), 1.0))
+        return float(_coefficients(pairing, found[-1].z, found[-1].p, sense)[1][0])
 
     try:
-        _halve(test) if other else test(brentq(test, 0.0, 1.0, xtol=HUB))
+        if low == high:
+            test(brentq(test, 0.0, 1.0, xtol=HUB))
+            hub = found[-1]
+        else:
+            share = _halve(test)
+            hub = found[-1]
+            _refuse_two(cubic, (cubic_at(share - FAR), cubic_at(share + FAR)))
     except (_NoCrossingError, ValueError):
         return None
     index = int(store.index[ends].min())
-    pairing.hubs[chord] = store.add(found[-1].z[0], found[-1].p[0], index, VertexKind.CROSSING)
+    pairing.hubs[chord] = store.add(hub.z[0], hub.p[0], index, VertexKind.CROSSING)
     return pairing.hubs[chord]
 
 
@@ -197,29 +212,41 @@ def _guess(
     return z, p
 
 
-def _halve(test: Callable[[float], float]) -> None:
-    """Go near a zero, at which the test itself may fail: another eigenvalue vanishes.
-
-    Poles of the test, at which folds of the side branch end on the crossing, change its sign, too.
-    """
+def _halve(test: Callable[[float], float]) -> float:
+    """Go near where a test begins to differ from zero, at which it may fail: a hub; its share."""
     low, high = 0.0, 1.0
-    first, last = test(low), test(high)
-    least = value = min(abs(first), abs(last))
     while high - low > NEAR:
         middle = 0.5 * (low + high)
         try:
-            value = test(middle)
+            same = test(middle) == 0.0
         except _NoCrossingError:
             if high - low > FAR:
                 raise
             break
-        low, high = (middle, high) if value * first > 0.0 else (low, middle)
-    if first * last > 0.0 or abs(value) >= least:
+        low, high = (middle, high) if same else (low, middle)
+    return 0.5 * (low + high)
+
+
+def _refuse_two(ends: ItemValues, around: tuple[float, float]) -> None:
+    """Refuse a hub with a zero of the cubic coefficient on the chord, but not near it.
+
+    `ends`, `around`: the coefficient at both ends, and on both sides of the hub.
+    """
+    if ends[0] * ends[1] > 0.0 > around[0] * around[1]:
         raise _NoCrossingError
 
 
+def _negative(
+    pairing: Pairing, z: Float[np.ndarray, "n size"], p: Float[np.ndarray, "n P"]
+) -> Items:
+    """Negative eigenvalues at crossings but for the one that vanishes, however soft the others."""
+    structure = pairing.setting.structure
+    nothing, shift = np.zeros((len(z), 0, structure.size)), np.full(len(z), -VANISHING)
+    return np.asarray(structure.solve(z, p, nothing, shift=shift).negative)
+
+
 class _NoCrossingError(Exception):
-    """Raised where the search for a hub leaves the crossing, or meets none."""
+    """Raised where the search for a hub leaves the crossing, or meets more than a hub."""
 
 
 def _coefficients(
