@@ -64,8 +64,7 @@ NEARLY, NEXT = 1e-5, 1e-11
 """Last correction on the way if the next one would be below: Newton squares it, times a gain that
 the last two corrections show."""
 DOUBT = 4.0
-"""Factor of the gain where it is that of an earlier step: the first correction is the last one
-then."""
+"""Factor of the gain where an earlier step showed it: the first correction is the last then."""
 ARRIVED = 1e-9
 """Last correction at the end of t, after which the point is exact to round-off."""
 MOST_ITERATIONS = 7
