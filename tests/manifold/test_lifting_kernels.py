@@ -237,7 +237,7 @@ def test_distances_between_points_have_the_slopes_of_their_tangents():
 
 
 def test_vertices_on_edges_are_looked_for_near_the_surface():
-    """On a paraboloid in the plane of two scaled parameters errors shrink with the fourth power."""
+    """On a paraboloid in the plane of two scaled parameters; halved edges err a tenth, or less."""
     generator, scales = np.random.default_rng(2), np.array([0.5, 3.0])
     metric = np.array([0, 2]), scales, np.array([2.0])  # one unknown of mass 4
     slope, curvature = np.array([0.3, -0.2]), np.array([[0.8, 0.5], [0.5, -0.6]])
