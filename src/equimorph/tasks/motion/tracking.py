@@ -19,7 +19,7 @@ from equimorph.model import Constraint, Descriptor, Schedule, position
 from equimorph.structures import State, States, margin_of
 from equimorph.tasks.motion.between_rows import BetweenRows
 from equimorph.tasks.motion.blocks import DENSE, path_by_blocks, same_descriptors, stable_path
-from equimorph.tasks.motion.course import Course, actuator_bounds
+from equimorph.tasks.motion.course import Course, actuator_bounds, may_graze
 from equimorph.tasks.motion.redundant import follow_redundant
 from equimorph.tasks.optimising.moving_optimum import MovingProblem, follow_minimum
 from equimorph.tasks.optimising.optimum_path import FollowedOptimum
@@ -144,10 +144,9 @@ def track(  # the knobs of the public face, all by keyword
     """Follow targets S*(t) of descriptors with at least as many actuators, while loads may move.
 
     ``S_a ȧ = Ṡ* − S_l l̇``, corrected onto the set at every step: an error-controlled continuation
-    in pseudo-arclength, first with coarse steps, and again with fine ones.
-    Many close targets are corrected side by side. With more actuators than targets the shortest
-    motion of the actuators is taken at every moment, in their scales; one that meets its limit is
-    held there as long as the remaining ones suffice.
+    in pseudo-arclength. Many close targets are corrected side by side. With more actuators than
+    targets the shortest motion of the actuators is taken at every moment, in their scales; one that
+    meets its limit is held there as long as the remaining ones suffice.
 
     Parameters
     ----------
@@ -242,24 +241,26 @@ class _Motion:
         of both as it is.
         """
         stable = margin_of(self.start.structure) >= 0.0
-        path = self._path((*self.within, *self.bounds, stable))
+        path = self._path((*self.within, *self.bounds), stable)
         end = path.end
         if end.kind in VIOLATIONS and end.detail == str(stable):
             lost = replace(end, kind=EventKind.CRITICAL, detail="")
             path = replace(path, events=(*path.events[:-1], lost))
         return path
 
-    def _path(self, every: tuple[Constraint, ...]) -> Path:
+    def _path(self, bounds: tuple[Constraint, ...], stable: Constraint) -> Path:
         first = self.legs[0](0.0) if callable(self.legs[0]) else self.legs[0]
         if sum(isinstance(key, Descriptor) for key in first) < len(self.names):
-            return self._redundant_path(every)
+            return self._redundant_path((*bounds, stable))
         if len(self.legs) >= DENSE and same_descriptors(self.legs):
-            check_start(self.start, every)
-            return path_by_blocks(self.course, self.start, every)
+            check_start(self.start, bounds)
+            return path_by_blocks(self.course, self.start, (*bounds, stable))
         freed = [_free_actuators(leg, self.names) for leg in self.legs]
-        path = lift(self.start, freed, within=every)
-        lost = path.end.kind == EventKind.LOST
-        return path if lost else lift(self.start, freed, within=every, options=FINE)
+        path = lift(self.start, freed, within=bounds, options=FINE)
+        # the margins of a whole path take a fraction of the time that they take step by step
+        if not may_graze([stable], path.states).any():
+            return path
+        return lift(self.start, freed, within=(*bounds, stable), options=FINE)
 
     def _redundant_path(self, every: tuple[Constraint, ...]) -> Path:
         """The shortest motion of more actuators than targets."""
