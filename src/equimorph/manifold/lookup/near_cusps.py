@@ -158,18 +158,22 @@ def _roots(
     return lane, node, s[lane, node] + low * step[lane, node]
 
 
-def united(structure: Structure, parts: list[Found]) -> Found:
-    """States of two parts, equal ones once, sorted by point and cell."""
-    also = np.unique(parts[1][1])
-    if len(also) == 0:
-        return parts[0]
-    z, point, cell = (np.concatenate(pair) for pair in zip(*parts, strict=True))
-    kept = [np.flatnonzero(~np.isin(point, also))]
-    for number in also:
-        mine = np.flatnonzero(point == number)
-        kept.append(mine[first_of_same(structure, z[mine])])
-    rows = np.concatenate(kept)
-    return in_order([(z[rows], point[rows], cell[rows])])
+def united(structure: Structure, parts: list[Found], others: list[Found]) -> list[Found]:
+    """Parts with states of others, equal ones once; those over the points of others in one part."""
+    also = np.unique(np.concatenate([point for _, point, _ in others]))
+    asked = [np.isin(point, also) for _, point, _ in parts]
+    known = in_order([_rows(part, own) for part, own in zip(parts, asked, strict=True)])
+    z, point, cell = (np.concatenate(columns) for columns in zip(known, *others, strict=True))
+    mine = [np.flatnonzero(point == number) for number in also]
+    kept = np.concatenate([own[first_of_same(structure, z[own])] for own in mine])
+    rest = [_rows(part, ~own) for part, own in zip(parts, asked, strict=True)]
+    return [*rest, (z[kept], point[kept], cell[kept])]
+
+
+def _rows(found: Found, some: Flags) -> Found:
+    """Some of the states."""
+    z, point, cell = found
+    return z[some], point[some], cell[some]
 
 
 def cusps_near(

@@ -56,6 +56,18 @@ CHUNK = 512
 Guesses = Float[np.ndarray, "hits size"]
 
 
+@dataclass(frozen=True)
+class _Chunk:
+    """States over some points."""
+
+    found: Found
+    """The certain ones."""
+    doubtful: Hits | None
+    """Cells near undecided points, if there are any."""
+    hidden: Found | None
+    """States beside cusps, if there are any."""
+
+
 @dataclass(frozen=True, eq=False)
 class Sheets:
     """Cells of a set with their states, as the queries for states over points need them."""
@@ -129,13 +141,14 @@ class Sheets:
         the point instead.
         """
         chunks = self._in_chunks(p)
-        parts = [found for found, _ in chunks]
-        doubtful = [near for _, near in chunks if near is not None]
+        parts = [chunk.found for chunk in chunks]
+        doubtful = [chunk.doubtful for chunk in chunks if chunk.doubtful is not None]
         if doubtful:
             parts.extend(self._search(p, Hits.concatenate(doubtful)))
+        hidden = [chunk.hidden for chunk in chunks if chunk.hidden is not None]
+        if hidden:
+            parts = united(self.structure, parts, hidden)
         z, point, cell = parts[0] if len(parts) == 1 else in_order(parts)
-        if self.cusps is not None:
-            z, point, cell = self._beside_cusps(self.cusps, p, (z, point, cell))
         if self.crossings is not None:
             z, point, cell = self._beside_crossings(self.crossings, p, z, point, cell)
         return States(self.structure, z, p[point]), point, cell
@@ -172,11 +185,15 @@ class Sheets:
         n = self.structure.unknowns
         return np.asarray((z[:, :n] - other[:, :n]) ** 2 @ self.structure.mass <= SAME_SOLUTION**2)
 
-    def _beside_cusps(self, cusps: NearCusps, p: Points, found: Found) -> Found:
-        """States found over points, and those that cells next to cusps hide."""
-        z, point, cell = cusps.states(self.structure, p, p[:, self.free], self.cell_index)
+    def _beside_cusps(self, p: Points, first: int) -> Found | None:
+        """States over points that cells next to cusps hide, if any; `first` is added."""
+        if self.cusps is None:
+            return None
+        z, point, cell = self.cusps.states(self.structure, p, p[:, self.free], self.cell_index)
+        if len(point) == 0:
+            return None
         good = self.structure.resolved(z, p[point]) & are_feasible(self.constraints, z, p[point])
-        return united(self.structure, [found, (z[good], point[good], cell[good])])
+        return (z[good], first + point[good], cell[good]) if good.any() else None
 
     def _beside_crossings(
         self, crossings: NearCrossings, p: Points, z: Lanes, point: Numbers, cell: Numbers
@@ -202,12 +219,12 @@ class Sheets:
         order = np.lexsort((cell, point))
         return z[order], point[order], cell[order]
 
-    def _in_chunks(self, p: Points) -> list[tuple[Found, Hits | None]]:
+    def _in_chunks(self, p: Points) -> list["_Chunk"]:
         """States and undecided cells as `_some` finds them, chunk by chunk, on all threads."""
         if len(p) <= CHUNK:
             return [self._some(p, 0)]
         starts = range(0, len(p), CHUNK)
-        out: dict[int, tuple[Found, Hits | None]] = {}
+        out: dict[int, _Chunk] = {}
 
         def serve(own: range) -> None:
             for at in own:
@@ -221,13 +238,14 @@ class Sheets:
                 task.result()
         return [out[at] for at in starts]
 
-    def _some(self, p: Points, first: int) -> tuple[Found, Hits | None]:
-        """Certain states over points, and the cells near undecided ones; `first` is added."""
+    def _some(self, p: Points, first: int) -> "_Chunk":
+        """States over some points; `first` is added to the numbers of these."""
         near = self._near(p[:, self.free])
         of_hits = near.cell, near.weights
         tried = worth_trying(of_hits, near.inside, self._brims, self.above.maps, NUDGE)
         if len(tried) == 0:
-            return (np.zeros((0, self.points.z.shape[1])), tried, tried), None
+            nothing = np.zeros((0, self.points.z.shape[1])), tried, tried
+            return _Chunk(nothing, None, self._beside_cusps(p, first))
         hits = near.take(tried)
         at, guess = p[hits.point], self._guess(hits)
         wanted, room = self.cell_index[hits.cell], self._room[hits.cell]
@@ -245,7 +263,8 @@ class Sheets:
             doubtful = near.take(~sure[near.point])
             doubtful = replace(doubtful, point=first + doubtful.point)
         kept = found[are_feasible(self.constraints, z[found], at[found])]
-        return (z[kept], first + hits.point[kept], hits.cell[kept]), doubtful
+        certain = z[kept], first + hits.point[kept], hits.cell[kept]
+        return _Chunk(certain, doubtful, self._beside_cusps(p, first))
 
     def _near(self, x: Float[np.ndarray, "points d"]) -> Hits:
         """Cells near points, including those at the rims whose bands contain the points."""
