@@ -1,4 +1,7 @@
-"""`follow_optimum`: a local optimum while loads and targets vary, and where it jumps."""
+"""`follow_optimum`: a local optimum while loads and targets vary, and where it jumps.
+
+See docs/decisions.md, "Steps of a moving optimum do not pass its expected end".
+"""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -205,12 +208,13 @@ class _Track:
         if len(self.optima) < 2 or (self.jumps and self.jumps[-1].at >= self.optima[-2].time):
             return None
         first, second = self.optima[-2:]
-        return (first, second) if first.time >= np.floor(second.time - 1e-12) else None
+        apart = second.time - first.time > CLOSEST * (1.0 + first.time)
+        return (first, second) if apart and first.time >= np.floor(second.time - 1e-12) else None
 
     def expected_end(self) -> float:
         """Time at which the optimum is expected to end; not a number if unknown."""
         pair = self.smooth_pair()
-        if pair is None or self.failure == np.inf:
+        if pair is None:
             return np.nan
         bends = (pair[0].certificate.curvature, pair[1].certificate.curvature)
         return expected_end((pair[0].time, pair[1].time), bends)
@@ -258,12 +262,12 @@ def _advance(track: _Track) -> None:
     """Try one step: go on to the next optimum, or remember that it failed, and shorten."""
     here, end = track.last, track.expected_end()
     ahead = here.time + track.step
-    if here.time < end < track.failure:
+    if here.time < end < track.failure < np.inf:
         ahead = next_trial(here.time, end, track.failure)
     ahead = min(ahead, np.floor(here.time) + 1.0, track.problem.course.legs)
     guess = track.predict(ahead, end)
     there = None if guess is None else _solve(track.problem, guess, ahead, SHORT)
-    if there is None or guess is None or not _goes_on(here, there, guess):
+    if there is None or guess is None or not _goes_on(here, there, guess, end):
         track.failure, track.step = ahead, SHORTER * (ahead - here.time)
         return
     track.step = min(1.5 * (ahead - here.time), LARGEST)
@@ -301,12 +305,13 @@ def _solve(
     return _Found(time, programme, end, found)
 
 
-def _goes_on(here: _Found, there: _Found, guess: SetPoints) -> bool:
-    """Whether an optimum is where the one before leads to."""
+def _goes_on(here: _Found, there: _Found, guess: SetPoints, end: float) -> bool:
+    """Whether an optimum is where the one before leads to, which is expected to end at a time."""
     aim = embed(there.programme.setting, guess.z, guess.p)[0]
     way = float(np.linalg.norm(there.place - here.place))
     off = float(np.linalg.norm(there.place - aim))
-    return way <= NEAR or (way <= FAR and off <= SURE * float(np.linalg.norm(aim - here.place)))
+    near = way <= FAR and off <= SURE * float(np.linalg.norm(aim - here.place))
+    return way <= NEAR or (near and not here.time < end < there.time)
 
 
 def _beyond(problem: MovingProblem, here: _Found, ahead: float) -> _Found | None:
