@@ -2,29 +2,19 @@
 
 from abc import abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from functools import cached_property
-from typing import Any, ClassVar
+from functools import cached_property, wraps
+from typing import Any, ClassVar, TypeVar, cast
 
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
 from equimorph.argument_vocabulary import SHARE
-from equimorph.arrays import Directions, Flags, Float, Int, Lanes, Parameters, Sides, Values
+from equimorph.arrays import Flags, Float, Lanes, Parameters, Values
 from equimorph.errors import InputError
-from equimorph.linalg import BorderedSolution
-from equimorph.linalg.intervals import Interval
 from equimorph.model import Constraint, Descriptor, remember_call
-from equimorph.structures.contract import Readers, Symmetry, Written
+from equimorph.structures.contract import Readers, Structure, Symmetry, Written
 from equimorph.structures.equations import (
-    Advance,
-    AnyBorder,
     CompiledNewton,
-    Direction,
-    Enclosed,
-    Force,
-    LinearSystem,
-    Response,
-    Shift,
 )  # fmt: skip
 from equimorph.structures.resolution import Refinable
 from equimorph.structures.rod.arclengths import (
@@ -59,8 +49,20 @@ _SYMBOLS = {0.5: "½", 1 / 3: "1/3", 2 / 3: "2/3", 0.25: "¼", 0.75: "¾"}
 Field = Callable[[Lanes, Parameters, Arclengths], Values]
 """Values of a field, one a lane, at one arclength."""
 Peaks = Float[np.ndarray, "lanes peaks"]
+Method = TypeVar("Method", bound=Callable[..., Any])
 Branches = Callable[[Lanes, Parameters], tuple[Peaks, Peaks]]
 """Local maxima along the rod, and their arclengths."""
+
+
+def by_mechanics(method: Method) -> Method:
+    """A method of the contract of structures that rods leave to their mechanics."""
+
+    @wraps(method)
+    def answer(rod: "AnyRod", *given: Any, **named: Any) -> Any:
+        return getattr(rod.mechanics, method.__name__)(*given, **named)
+
+    vars(answer).pop("__isabstractmethod__", None)  # which `wraps` copies
+    return cast(Method, answer)
 
 
 class AnyRod(HeavyRod, Refinable):
@@ -137,76 +139,26 @@ class AnyRod(HeavyRod, Refinable):
 
     # --- the contract, by the mechanics ---------------------------------------------------------
 
-    def energy(self, z: Lanes, p: Parameters) -> Values:
-        """Potential energy E, in units of 4π²B/L."""
-        return self.mechanics.energy(z, p)
-
-    def residual(self, z: Lanes, p: Parameters) -> Lanes:
-        """F(z; p)."""
-        return self.mechanics.residual(z, p)
-
-    def parameter_derivative(self, z: Lanes, p: Parameters, dp: Parameters) -> Lanes:
-        """F_p·dp."""
-        return self.mechanics.parameter_derivative(z, p, dp)
-
-    def second_derivative(self, z: Lanes, p: Parameters, v: Direction, w: Direction) -> Lanes:
-        """D²F[v, w]."""
-        return self.mechanics.second_derivative(z, p, v, w)
-
-    def enclosure(self, z: Interval, p: Interval) -> Enclosed | None:
-        """Bounds over boxes, where the mechanics know them."""
-        return self.mechanics.enclosure(z, p)
-
-    def effort(self, z: Lanes, p: Parameters) -> Parameters:
-        """∂L/∂p: couples and forces of actuators, displacements of loads."""
-        return self.mechanics.effort(z, p)
-
-    def solve(
-        self, z: Lanes, p: Parameters, rhs: Sides, border: AnyBorder = None, shift: Shift = None
-    ) -> BorderedSolution:
-        """Solve with F_z − shift·mass, bordered."""
-        return self.mechanics.solve(z, p, rhs, border, shift)
-
-    def linear_system(self, z: Lanes, p: Parameters, directions: Directions) -> LinearSystem:
-        """F, F_p along directions, and solves with F_z; computed together."""
-        return self.mechanics.linear_system(z, p, directions)
-
-    def advance(
-        self, z: Lanes, p: Parameters, dp: Parameters, row: Lanes, corner: Values, defect: Values
-    ) -> Advance:
-        """One Newton step, with tangent and inertia."""
-        return self.mechanics.advance(z, p, dp, row, corner, defect)
-
-    def advance_under(
-        self, force: Force, z: Lanes, p: Parameters, row: Lanes, corner: Values, defect: Values
-    ) -> Advance:
-        """One Newton step under a force."""
-        return self.mechanics.advance_under(force, z, p, row, corner, defect)
-
-    def respond(self, z: Lanes, p: Parameters, directions: Directions) -> Response:
-        """One Newton step, with tangents along directions."""
-        return self.mechanics.respond(z, p, directions)
-
-    def correction(self, z: Lanes, p: Parameters) -> Advance:
-        """One Newton step at fixed parameters."""
-        return self.mechanics.correction(z, p)
+    energy = by_mechanics(Structure.energy)
+    residual = by_mechanics(Structure.residual)
+    parameter_derivative = by_mechanics(Structure.parameter_derivative)
+    second_derivative = by_mechanics(Structure.second_derivative)
+    enclosure = by_mechanics(Structure.enclosure)
+    effort = by_mechanics(Structure.effort)
+    solve = by_mechanics(Structure.solve)
+    linear_system = by_mechanics(Structure.linear_system)
+    advance = by_mechanics(Structure.advance)
+    advance_under = by_mechanics(Structure.advance_under)
+    respond = by_mechanics(Structure.respond)
+    correction = by_mechanics(Structure.correction)
+    index = by_mechanics(Structure.index)
+    sample = by_mechanics(Structure.sample)
+    resolved = by_mechanics(Structure.resolved)
 
     @property
     def compiled_newton(self) -> CompiledNewton | None:
         """Newton's method of the mechanics, if it is compiled."""
         return self.mechanics.compiled_newton
-
-    def index(self, z: Lanes, p: Parameters) -> Int[np.ndarray, " lanes"]:
-        """Negative eigenvalues of the constrained Hessian."""
-        return self.mechanics.index(z, p)
-
-    def sample(self, p: Parameters, generator: np.random.Generator) -> Lanes:
-        """Random guesses."""
-        return self.mechanics.sample(p, generator)
-
-    def resolved(self, z: Lanes, p: Parameters) -> Flags:
-        """Whether the highest Legendre coefficients of the rotations are small in every element."""
-        return self.mechanics.resolved(z, p)
 
     def symmetries(self) -> tuple[Symmetry, ...]:
         """Mirror images and half turns of equilibria that are equilibria."""
