@@ -4,7 +4,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, ClassVar, Generic, Protocol, TypeVar
+from typing import Any, ClassVar, Generic, TypeVar
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from equimorph.errors import InputError, suggestion
 from equimorph.model import Parameter, names_of
 from equimorph.model.parameter import Role
 from equimorph.structures.rod.discretisation import Mesh, mesh_with_kinks
-from equimorph.structures.rod.ends import Support
+from equimorph.structures.rod.ends import Axis, Support
 from equimorph.structures.rod.lagrangian import RodLagrangian
 from equimorph.structures.rod.profiles import LoadShape, profile
 from equimorph.structures.rod.terms import Term, Terms, term
@@ -29,11 +29,12 @@ CLOSEST = 1e-6
 """Shortest piece of a rod between kinks."""
 
 
+Built = TypeVar("Built")
 Model = TypeVar("Model", bound=RodLagrangian)
 
 
 @dataclass(frozen=True, eq=False)
-class RodDescription(ABC):
+class RodDescription(ABC, Generic[Built, Model]):
     """A rod as its user describes it.
 
     *Raw* parameters are the prescribed angles of the ends, the amplitudes of the terms and the
@@ -74,8 +75,21 @@ class RodDescription(ABC):
 
     @property
     @abstractmethod
+    def axes(self) -> Sequence[Axis]:
+        """Axes along which supports hold the ends."""
+
+    @property
     def opposed(self) -> set[str]:
         """Places of end B along axes that both supports hold."""
+        return {axis.name for axis in self.axes if axis.opposed}
+
+    @abstractmethod
+    def build(self, elements: int, degree: int) -> Built:
+        """The rod in non-dimensional form."""
+
+    @abstractmethod
+    def raw_model(self, elements: int, degree: int) -> Model:
+        """The Lagrangian in the raw parameters."""
 
     def check_reach(self, given: Mapping[str, Any], length: Any) -> None:
         """Refuse places of end B that an inextensible rod cannot reach.
@@ -298,34 +312,14 @@ RESOLUTION = (2, 3)
 """Elements and degree of a mesh that is used for its breaks alone."""
 
 
-Built_co = TypeVar("Built_co", covariant=True)
-
-
-class Description(Protocol[Built_co]):
-    """What is asked of the description of a rod, in the plane or in space."""
-
-    @property
-    def raw_names(self) -> tuple[str, ...]:
-        """Raw parameters, in their order."""
-
-    def build(self, elements: int, degree: int) -> Built_co:
-        """The rod in non-dimensional form."""
-
-    def raw_model(self, elements: int, degree: int) -> Any:
-        """The Lagrangian in the raw parameters."""
-
-    def matrix(self, model: Any) -> Float[np.ndarray, "scalars others"]:
-        """Raw scalars as combinations of the user's."""
-
-
 @dataclass(frozen=True, eq=False)
-class Construction(Generic[Built_co]):
+class Construction(Generic[Built]):
     """Profiles, terms and ends of a rod, and its raw parameters by those of its user.
 
     build: non-dimensional; table: of the raw parameters, times the user's parameters and 1.
     """
 
-    build: Built_co
+    build: Built
     names: tuple[str, ...]
     table: Float[np.ndarray, "raw settings"]
 
@@ -334,7 +328,7 @@ class Construction(Generic[Built_co]):
         return np.asarray(self.table[self.names.index(name)])
 
 
-def construction(description: Description[Built_co], parameters: int) -> Construction[Built_co]:
+def construction(description: RodDescription[Built, Any], parameters: int) -> Construction[Built]:
     """Take the description of a rod apart whose user has some parameters; further ones are zero."""
     model = description.raw_model(*RESOLUTION)
     first = model.multipliers

@@ -10,7 +10,7 @@ import numpy as np
 from equimorph.errors import InputError
 from equimorph.model import Parameter
 from equimorph.structures.rod.any_description import RodDescription, check_profile_positive
-from equimorph.structures.rod.ends import HELD, End, check_supports, end, support_axes
+from equimorph.structures.rod.ends import HELD, Axis, End, check_supports, end, support_axes
 from equimorph.structures.rod.model import Build, RodModel, raw_model, raw_names
 from equimorph.structures.rod.terms import Pressure
 
@@ -18,7 +18,7 @@ SIDES = (attrgetter("first"), attrgetter("last"))
 """How ends A and B are held along an axis."""
 
 
-class PlanarDescription(RodDescription):
+class PlanarDescription(RodDescription[Build, RodModel]):
     """A general planar rod as its user describes it; see `Rod`."""
 
     defaults: ClassVar[Mapping[str, Any]] = {"stiffness": 1.0, "curvature": 0.0, "axial": None}
@@ -61,8 +61,9 @@ class PlanarDescription(RodDescription):
         for name, terms in self.terms.items():
             if not any(isinstance(one, Pressure) for one in terms):
                 continue
-            axes = support_axes(self.supports)
-            moves = [{at for at, axis in enumerate(axes) if each(axis) != HELD} for each in SIDES]
+            moves = [
+                {at for at, axis in enumerate(self.axes) if each(axis) != HELD} for each in SIDES
+            ]
             if max(map(len, moves)) > 1:
                 raise InputError(
                     f"`ends` must leave each end of a rod under the pressure `{name}` one "
@@ -82,9 +83,9 @@ class PlanarDescription(RodDescription):
                 )
 
     @property
-    def opposed(self) -> set[str]:
-        """Places of end B along axes that both supports hold."""
-        return {axis.name for axis in support_axes(self.supports) if axis.opposed}
+    def axes(self) -> tuple[Axis, Axis]:
+        """Axes along which supports hold the ends."""
+        return support_axes(self.supports)
 
     def place_parameter(self, raw: str) -> Parameter:
         """Angle of an end, span, rise, or the distance of an inclined line."""
@@ -96,7 +97,7 @@ class PlanarDescription(RodDescription):
             blank = Parameter(raw, label, scale, "fixed", None, -far, far)
             return Parameter(raw, label, scale, "fixed", blank.check(span), -far, far)
         if raw == "offset":
-            unit = support_axes(self.supports)[1].unit
+            unit = self.axes[1].unit
             return Parameter(raw, label, scale, "fixed", float(np.dot(unit, (span, rise))))
         if raw == "rise":
             return Parameter(raw, label, scale, "fixed", rise)

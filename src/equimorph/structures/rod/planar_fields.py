@@ -6,7 +6,7 @@ smaller by t/(6 L), shear of forces across it by t/L: both are left out.
 
 from abc import abstractmethod
 from functools import cached_property
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -35,7 +35,7 @@ class StressedRod(Stressed, AnyRod):
 
     @property
     @abstractmethod
-    def description(self) -> RodDescription:
+    def description(self) -> RodDescription[Any, Any]:
         """The rod as its user describes it."""
 
     @property

@@ -1,6 +1,6 @@
 """Description of a rod in space by its user, and how its model follows."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, ClassVar
@@ -10,6 +10,7 @@ import numpy as np
 from equimorph.errors import InputError
 from equimorph.model import Parameter
 from equimorph.structures.rod.any_description import RodDescription, check_profile_positive
+from equimorph.structures.rod.ends import Axis
 from equimorph.structures.rod.terms import Term
 from equimorph.structures.spatial.ends import (
     PLACES,
@@ -43,7 +44,7 @@ LARGEST_TWIST = 4.0 * np.pi
 
 
 @dataclass(frozen=True, eq=False)
-class SpatialDescription(RodDescription):
+class SpatialDescription(RodDescription[Build, SpatialModel]):
     """A rod in space as its user describes it; see `SpatialRod`."""
 
     phase: bool = False
@@ -115,9 +116,9 @@ class SpatialDescription(RodDescription):
         return SpatialMechanics(own) if obstacle(own) else OrbitMechanics(own)
 
     @property
-    def opposed(self) -> set[str]:
-        """Places of end B along axes that both supports hold."""
-        return {axis.name for axis in support_axes(self.supports) if axis.opposed}
+    def axes(self) -> Sequence[Axis]:
+        """Axes along which supports hold the ends."""
+        return support_axes(self.supports)
 
     def check_places(self, given: Mapping[str, Any], length: Any) -> None:
         """Refuse places that an inextensible rod cannot reach, or that break orbits."""
