@@ -44,33 +44,29 @@ class Reflection:
         return Reflection("", np.ones_like(self.signs))
 
 
-@dataclass(frozen=True, eq=False)
-class Images:
-    """How one kind of rod is reflected.
-
-    features
-        Coefficients of all scalars in the image of the rod.
-    reversible
-        Whether stiffnesses, supports and mesh are the same from both ends.
-    unknowns
-        Image of the unknowns.
-    """
-
-    features: Callable[[Reflection], Features]
-    reversible: bool
-    unknowns: Callable[[Reflection, Lanes], Lanes]
-
-
 def find_symmetries(
-    model: RodLagrangian, unknowns: int, candidates: Sequence[Reflection], images: Images
+    model: RodLagrangian,
+    unknowns: int,
+    candidates: Sequence[Reflection],
+    features: Callable[[Reflection], Features],
+    image: Callable[[Reflection, Lanes], Lanes],
+    tables: Sequence[tuple[np.ndarray, np.ndarray]],
 ) -> tuple[Symmetry, ...]:
-    """Symmetries among the candidates that a rod has, with their maps of the parameters."""
-    found = []
+    """Symmetries among the candidates that a rod has, with their maps of the parameters.
+
+    `features`: coefficients of all scalars in the image of the rod; `image`: that of the unknowns;
+    `tables`: stiffnesses as seen from either end.
+    """
+    found, here, lengths = [], features(candidates[0].none), model.mesh.lengths
+    reversible = model.held[0] == model.held[1] and all(model.from_start)
+    reversible &= all(is_equal(*each) for each in (*tables, (lengths, lengths[::-1])))
     for each in candidates:
-        matrix = _scalar_map(model, each, images)
+        if each.reverse and not reversible:
+            continue
+        matrix = _scalar_map(model, here, features(each))
         if matrix is not None:
             own = matrix[model.multipliers : -1, model.multipliers : -1]
-            apply = partial(_apply, matrix, unknowns, partial(images.unknowns, each))
+            apply = partial(_apply, matrix, unknowns, partial(image, each))
             found.append(Symmetry(each.name, apply, own.sum(axis=0), np.abs(own).argmax(axis=0)))
     return tuple(found)
 
@@ -85,14 +81,11 @@ def _apply(
     return moved, np.ascontiguousarray(image[:, m:-1])
 
 
-def _scalar_map(model: RodLagrangian, by: Reflection, images: Images) -> Matrix | None:
+def _scalar_map(model: RodLagrangian, here: Features, image: Features) -> Matrix | None:
     """Matrix T that takes scalars to those of the image, ``y T``; None if no such T exists.
 
     Parameters change their sign, or places two by two; multipliers may take up a share of loads.
     """
-    if by.reverse and not images.reversible:
-        return None
-    here, image = images.features(by.none), images.features(by)
     m, count = model.multipliers, len(here)
     matrix = np.zeros((count, count))
     for j in range(count):
@@ -147,8 +140,10 @@ CANDIDATES = (
 
 def symmetries(model: RodModel, unknowns: int) -> tuple[Symmetry, ...]:
     """Symmetries among the `CANDIDATES` that the rod has."""
-    images = Images(partial(_features, model), _is_reversible(model), _image)
-    return find_symmetries(model, unknowns, CANDIDATES, images)
+    stiff, soft = model.stiffness, model.softness
+    tables = (stiff, stiff[::-1, ::-1, ::-1]), (soft, soft[::-1])
+    features = partial(_features, model)
+    return find_symmetries(model, unknowns, CANDIDATES, features, _image, tables)
 
 
 def _image(by: Reflection, theta: Lanes) -> Lanes:
@@ -169,14 +164,3 @@ def _features(model: RodModel, by: Reflection) -> Float[np.ndarray, "scalars som
         model.pressure[:, None] * (mirrored @ model.closing @ mirrored).ravel(),
     )
     return np.concatenate(parts, axis=1)
-
-
-def _is_reversible(model: RodModel) -> bool:
-    """Whether stiffness, supports and mesh are symmetric."""
-    return (
-        model.held[0] == model.held[1]
-        and all(model.from_start)
-        and is_equal(model.stiffness, model.stiffness[::-1, ::-1, ::-1])
-        and is_equal(model.softness, model.softness[::-1])
-        and is_equal(model.mesh.lengths, model.mesh.lengths[::-1])
-    )

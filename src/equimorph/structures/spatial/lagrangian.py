@@ -14,7 +14,7 @@ from equimorph.arrays import Flags, Float, Lanes, Parameters, Scalars, Values
 from equimorph.structures.contract import Symmetry
 from equimorph.structures.equations import Direction
 from equimorph.structures.rod.mechanics import RodMechanics
-from equimorph.structures.rod.reflections import Images, Reflection, find_symmetries, is_equal
+from equimorph.structures.rod.reflections import Reflection, find_symmetries
 from equimorph.structures.spatial.model import SpatialModel
 from equimorph.structures.spatial.quaternions import (
     FRAME,
@@ -283,8 +283,9 @@ def symmetries(model: SpatialModel, unknowns: int) -> tuple[Symmetry, ...]:
     With a reflection M = diag(±1, ±1, ±1) a state R(s) has the image M R M, taken at s or at 1 − s:
     the latter where M turns x round. Its strains are ± det(M) M u, its tangents ± M t with + at s.
     """
-    images = Images(partial(_features, model), _is_reversible(model), _image)
-    return find_symmetries(model, unknowns, CANDIDATES, images)
+    tables = [(each, each[::-1, ::-1]) for each in (model.stiffness, model.softness)]
+    features = partial(_features, model)
+    return find_symmetries(model, unknowns, CANDIDATES, features, _image, tables)
 
 
 def _axial(by: Reflection) -> Float[np.ndarray, "3"]:
@@ -311,14 +312,3 @@ def _features(model: SpatialModel, by: Reflection) -> Float[np.ndarray, "scalars
         np.moveaxis(turned, -1, 0),
     )
     return np.concatenate([each.reshape(model.scalars, -1) for each in parts], axis=1)
-
-
-def _is_reversible(model: SpatialModel) -> bool:
-    """Whether stiffnesses, supports and mesh are symmetric."""
-    return (
-        model.held[0] == model.held[1]
-        and all(model.from_start)
-        and is_equal(model.stiffness, model.stiffness[::-1, ::-1])
-        and is_equal(model.softness, model.softness[::-1, ::-1])
-        and is_equal(model.mesh.lengths, model.mesh.lengths[::-1])
-    )
