@@ -13,7 +13,7 @@ from equimorph.errors import InputError
 from equimorph.linalg.lanes import over_lanes
 from equimorph.linalg.sparse import SparseLayout
 from equimorph.structures.contract import Structure
-from equimorph.structures.equations import Advance, JointEquations, Solver
+from equimorph.structures.equations import Advance, Equations, JointEquations, Solver
 from equimorph.structures.newton import Limits, newton
 from equimorph.structures.states import State, natural_state
 
@@ -26,7 +26,7 @@ BALANCED = 1e-13
 
 
 def continue_equilibria(
-    structure: Structure,
+    structure: Equations,
     guess: Callable[[Parameters], Lanes],
     start: Parameters,
     p: Parameters,
@@ -47,7 +47,7 @@ def continue_equilibria(
     return z, found
 
 
-def correct_at_parameters(structure: Structure, z: Lanes, p: Parameters) -> tuple[Lanes, Flags]:
+def correct_at_parameters(structure: Equations, z: Lanes, p: Parameters) -> tuple[Lanes, Flags]:
     """Newton at fixed parameters, and whether it settled; balanced guesses stay as they are."""
     balanced = _is_balanced(structure, z, p)
     found = newton(structure, z, p, SURE)
@@ -57,7 +57,7 @@ def correct_at_parameters(structure: Structure, z: Lanes, p: Parameters) -> tupl
     return z, good & np.isfinite(z).all(axis=1)
 
 
-def _is_balanced(structure: Structure, z: Lanes, p: Parameters) -> Flags:
+def _is_balanced(structure: Equations, z: Lanes, p: Parameters) -> Flags:
     return np.asarray(np.abs(structure.residual(z, p)).max(axis=1, initial=0.0) <= BALANCED)
 
 

@@ -13,11 +13,10 @@ from equimorph.errors import InputError
 from equimorph.model import Descriptor, remember_call
 from equimorph.structures.any_network import is_symmetry
 from equimorph.structures.contract import Readers, Symmetry, Written
-from equimorph.structures.discrete import STEPS, SURE
+from equimorph.structures.discrete import continue_equilibria
 from equimorph.structures.frame.images import SpatialImage, find_images
 from equimorph.structures.frame.patterns import Actuators, Loads, Patterns
 from equimorph.structures.network import Joints
-from equimorph.structures.newton import newton
 from equimorph.structures.resolution import SMALLEST_IN_SPACE
 from equimorph.structures.rod.fibres import Stressed
 from equimorph.structures.space_frame.fields import SpatialFrameFields
@@ -72,12 +71,7 @@ def grow_stress(model: SpatialFrameModel, p: Parameters) -> tuple[Lanes, Flags]:
     """Natural states: initial strains and actuators grow together from the frame as drawn."""
     growing = GrowingFrame(model)
     target = np.concatenate([p, np.ones((len(p), 1))], axis=1)
-    z, found = growing.natural_guess(p), np.ones(len(p), bool)
-    for k in range(1, STEPS + 1):
-        here = target * (k / STEPS)
-        step = newton(growing, z, here, SURE)
-        z, found = step.z, found & step.found
-    return z, found & np.isfinite(z).all(axis=1)
+    return continue_equilibria(growing, growing.natural_guess, np.zeros_like(target), target)
 
 
 SECTION = ("t", "n", "b")
