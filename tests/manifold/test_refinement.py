@@ -271,6 +271,15 @@ def test_accuracy_in_the_call_is_that_of_refine():
     assert at_once.audit.accuracy == 0.05
 
 
+def test_audits_of_refined_sets_keep_the_counts_of_searches():
+    """Identity: refinement searches nothing, so that what was searched before still counts."""
+    with unchecked():
+        eset = equilibrium_set(fold_form(), Box(a=(-1, 1)), checks=3, intervals=(5,))
+    fine, searched = refined(eset, 1e-3).audit, eset.audit
+    assert 0 < searched.arrived <= searched.starts
+    assert (fine.arrived, fine.starts) == (searched.arrived, searched.starts)
+
+
 @pytest.mark.parametrize("accuracy", [0.0, -1.0, np.nan, np.inf])
 def test_accuracy_must_be_positive(accuracy):
     eset = lifted(fold_form(), Box(a=(-1, 1)), (3,))

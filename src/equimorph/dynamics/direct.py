@@ -14,6 +14,7 @@ from equimorph.dynamics.spatial_rods import check_isolated
 from equimorph.dynamics.writer import document
 from equimorph.errors import InputError
 from equimorph.structures import SpatialRod, State, States, Structure, Truss
+from equimorph.structures.margin import generic_vectors, inverse_step
 
 FIRST_MODE = 5.0
 """Lowest angular frequency at the start in units of 1/T: about that of a clamped arch."""
@@ -72,11 +73,9 @@ class DirectModel(Model):
     def _normal_form(self, fold: State, time: float, motion: Motion, damping: float) -> FoldDelay:
         structure, n = self.structure, self.structure.unknowns
         z, p = fold.z[None], fold.p[None]
-        wide = np.random.default_rng(0).normal(size=structure.size)
+        wide = generic_vectors(structure, 1)[0]
         for _ in range(SWEEPS):
-            rhs = np.zeros((1, 1, structure.size))
-            rhs[0, 0, :n] = structure.mass * wide[:n]
-            wide = structure.solve(z, p, rhs).x[0, 0]
+            wide = inverse_step(structure, z, p, wide[None, :n])[0]
             wide /= np.sqrt(structure.mass @ wide[:n] ** 2)
         step = PROBE * max(abs(time), 1e-12)
         rate = (motion(time + step) - motion(time - step)) / (2.0 * step)

@@ -23,6 +23,7 @@ from equimorph.equilibria.steps import Front, Points, least_inside
 from equimorph.equilibria.trace import Traces
 from equimorph.equilibria.trace_options import EventCode, TraceOptions
 from equimorph.structures import Structure
+from equimorph.structures.margin import count_below, generic_vectors, inverse_step
 
 AT_ONCE = 1024
 """Points, or lanes, that are evaluated together: they stay in the cache."""
@@ -221,17 +222,12 @@ def multiplicity(structure: Structure, z: Lanes, p: Parameters, near: Values) ->
     """Number of eigenvalues of the constrained Hessian, in the metric, within ±near of zero."""
     if len(z) == 0:
         return np.zeros(0, int)
-    nothing, shift = np.zeros((2 * len(z), 0, structure.size)), np.concatenate([near, -near])
-    both = structure.solve(np.concatenate([z, z]), np.concatenate([p, p]), nothing, shift=shift)
-    above, below = np.split(both.negative, 2)
-    return np.asarray(above - below)
+    return np.asarray(count_below(structure, z, p, near) - count_below(structure, z, p, -near))
 
 
 def _small_eigenvalue(structure: Structure, z: Lanes, p: Parameters) -> Values:
     """Harmonic mean of the eigenvalues, of the size of the smallest one: by a single solution."""
-    n, mass = structure.unknowns, structure.mass
-    vector = np.cos(1.7 * np.arange(n)) + 1.3
-    rhs = np.zeros((len(z), 1, structure.size))
-    rhs[:, 0, :n] = mass * vector
-    yielding = structure.solve(z, p, rhs).x[:, 0, :n] @ (mass * vector)
-    return np.asarray(np.abs(mass @ vector**2 / np.where(yielding == 0.0, np.inf, yielding)))
+    vector, mass = generic_vectors(structure, len(z)), structure.mass
+    answer = inverse_step(structure, z, p, vector)[:, : structure.unknowns]
+    yielding = (answer * vector) @ mass
+    return np.asarray(np.abs(vector**2 @ mass / np.where(yielding == 0.0, np.inf, yielding)))

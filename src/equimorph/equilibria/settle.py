@@ -43,6 +43,7 @@ from equimorph.equilibria.newton_step import (
 from equimorph.equilibria.point_conditions import Condition
 from equimorph.model import Constraint
 from equimorph.structures import Equations, Structure, newton_kernels
+from equimorph.structures.margin import count_below
 from equimorph.structures.newton import Limits, Newton, Through, newton
 from equimorph.structures.newton_kernels import FOUND, NEAR, OPEN
 
@@ -201,15 +202,10 @@ def settle(
         directions = np.zeros((len(z), 0, p.shape[1]))
     problem = Problem(structure, directions, tuple(conditions), frame)
     if held and not conditions and problem.width == 0 and guards.known is None:
-        return _apply_guards(structure, _at_parameters(structure, z, p, guards), z, p, guards)
+        return _apply_guards(structure, _as_settled(newton(structure, z, p, guards)), z, p, guards)
     if problem.in_one_plane and guards.known is None:
         return _apply_guards(structure, _in_one_plane(problem, z, p, guards), z, p, guards)
     return _apply_guards(structure, _by_steps(problem, z, p, guards, frames=frames), z, p, guards)
-
-
-def _at_parameters(structure: Equations, z: Lanes, p: Parameters, guards: Guards) -> Settled:
-    """Newton's method by the fused step of the structure."""
-    return _as_settled(newton(structure, z, p, guards))
 
 
 def _in_one_plane(problem: Problem, z: Lanes, p: Parameters, guards: Guards) -> Settled:
@@ -368,5 +364,4 @@ def _apply_guards(
 
 def lower_index(structure: Equations, z: Lanes, p: Parameters) -> Numbers:
     """Index on the lower side of folds: eigenvalues below the one that vanishes."""
-    nothing, shift = np.zeros((len(z), 0, structure.size)), np.full(len(z), -SMALL_EIGENVALUE)
-    return np.asarray(structure.solve(z, p, nothing, shift=shift).negative - structure.constraints)
+    return count_below(structure, z, p, -SMALL_EIGENVALUE)

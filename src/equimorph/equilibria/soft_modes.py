@@ -11,6 +11,7 @@ from equimorph.arrays import Flags, Float, Lanes, Parameters, Values
 from equimorph.columns import Columns
 from equimorph.linalg import multiply
 from equimorph.structures import Structure, stability_margin
+from equimorph.structures.margin import generic_vectors, inverse_step
 from equimorph.tolerances import SAME_STATE
 
 Modes = Float[np.ndarray, "lanes unknowns"]
@@ -65,20 +66,20 @@ def soft_modes(structure: Structure, z: Lanes, p: Parameters) -> SoftModes:
     n, mass = structure.unknowns, structure.mass
     eigenvalue = stability_margin(structure, z, p)
     shift = eigenvalue - SHIFT * np.maximum(np.abs(eigenvalue), SMALLEST)
-    generic = np.tile(np.cos(1.7 * np.arange(n)) + 1.3, (len(z), 1))
+    generic = generic_vectors(structure, len(z))
     mode = generic
     for _ in range(INVERSE_ITERATIONS):
-        mode = _response(structure, z, p, mode, shift)
+        mode = inverse_step(structure, z, p, mode, shift)[:, :n]
         mode = mode / metric_length(structure, mode)[:, None]
     mode = mode * np.copysign(1.0, multiply(generic * mode, mass))[:, None]
     rest = generic - multiply(generic * mode, mass)[:, None] * mode
-    response = _response(structure, z, p, rest, shift)
+    response = inverse_step(structure, z, p, rest, shift)[:, :n]
     response -= multiply(response * mode, mass)[:, None] * mode
     size, answer = metric_length(structure, rest), metric_length(structure, response)
     # without another way to move there is no response outside the mode
     stiffness = np.where(answer > NOTHING * size, size / np.maximum(answer, 1e-300), 0.0)
     # the shift is far larger than small eigenvalues, which would have no digit left
-    across = multiply(mode * _response(structure, z, p, mode, np.zeros(len(z))), mass)
+    across = multiply(mode * inverse_step(structure, z, p, mode, np.zeros(len(z)))[:, :n], mass)
     with np.errstate(divide="ignore"):
         eigenvalue = np.where(np.isfinite(across) & (across != 0.0), 1.0 / across, eigenvalue)
     lengths, rate, critical = _lengths(structure, z, p, mode, eigenvalue)
@@ -102,14 +103,6 @@ def extents_of_guesses(structure: Structure, p: Parameters) -> Values:
     """The same for each lane at its own parameters."""
     own, back = np.unique(p, axis=0, return_inverse=True)
     return np.array([extent_of_guesses(structure, each[None]) for each in own])[back.ravel()]
-
-
-def _response(structure: Structure, z: Lanes, p: Parameters, vector: Modes, shift: Values) -> Modes:
-    """Solve (F_z − shift·M) x = M·vector for the unknowns."""
-    n = structure.unknowns
-    rhs = np.zeros((len(z), 1, structure.size))
-    rhs[:, 0, :n] = structure.mass * vector
-    return np.asarray(structure.solve(z, p, rhs, shift=shift).x[:, 0, :n])
 
 
 def _lengths(

@@ -10,7 +10,7 @@ from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
-from equimorph.arrays import Flags, Float, Lanes, Parameters, Sides, Values
+from equimorph.arrays import Flags, Float, Int, Lanes, Parameters, Sides, Values
 from equimorph.columns import Columns
 from equimorph.linalg import BorderedSolution
 from equimorph.linalg.lanes import in_background, threads
@@ -142,6 +142,24 @@ def _above(
     return value, proved
 
 
+def generic_vectors(structure: Pencil, lanes: int) -> Float[np.ndarray, "lanes unknowns"]:
+    """Vectors that are orthogonal to no mode."""
+    return np.tile(np.cos(1.7 * np.arange(structure.unknowns)) + 1.3, (lanes, 1))
+
+
+def inverse_step(
+    structure: Pencil,
+    z: Lanes,
+    p: Parameters,
+    vector: Float[np.ndarray, "lanes unknowns"],
+    shift: Shift = None,
+) -> Float[np.ndarray, "lanes entries"]:
+    """Solve (F_z − shift·mass) x = mass·vector: a step of inverse iteration."""
+    rhs = np.zeros((len(z), 1, structure.size))
+    rhs[:, 0, : structure.unknowns] = structure.mass * vector
+    return np.asarray(structure.solve(z, p, rhs, shift=shift).x[:, 0])
+
+
 def first_pairs(structure: Pencil, lanes: int) -> Pairs:
     """Vectors that are smooth along a chain, and orthogonal to no mode, for each lane."""
     n = structure.unknowns
@@ -251,7 +269,7 @@ def _by_bisection(
     if len(rest):
         low, high = (each[rest] for each in (low, high))
         low, high = _bisect(structure, z[rest], p[rest], low, high, ALL_HALVINGS)
-        below, above = (_count_below(structure, z[rest], p[rest], each) for each in (low, high))
+        below, above = (count_below(structure, z[rest], p[rest], each) for each in (low, high))
         value[rest] = np.where((below == 0) & (above > 0), 0.5 * (low + high), np.nan)
     return value
 
@@ -262,19 +280,17 @@ def _bisect(
     """Bounds of the smallest eigenvalue after bisections on the count of those below."""
     for _ in range(times):
         middle = 0.5 * (low + high)
-        below = _count_below(structure, z, p, middle) > 0
+        below = count_below(structure, z, p, middle) > 0
         high, low = np.where(below, middle, high), np.where(below, low, middle)
     return low, high
 
 
-def _count_below(
-    structure: Pencil,
-    z: Lanes,
-    p: Parameters,
-    shift: Values,
-) -> Values:
-    nothing = np.zeros((len(z), 0, structure.size))
-    return structure.solve(z, p, nothing, shift=shift).negative - float(structure.constraints)
+def count_below(
+    structure: Pencil, z: Lanes, p: Parameters, shift: float | Values
+) -> Int[np.ndarray, " lanes"]:
+    """Number of eigenvalues of the constrained Hessian, in the metric, below a shift."""
+    nothing, shift = np.zeros((len(z), 0, structure.size)), np.full(len(z), shift)
+    return structure.solve(z, p, nothing, shift=shift).negative - structure.constraints
 
 
 def _bracket(
@@ -283,11 +299,11 @@ def _bracket(
     p: Parameters,
 ) -> tuple[Values, Values]:
     """Numbers below and above the smallest eigenvalue, by doubling from zero."""
-    some = _count_below(structure, z, p, np.zeros(len(z))) > 0
+    some = count_below(structure, z, p, 0.0) > 0
     low, high = np.where(some, -1.0, 0.0), np.where(some, 0.0, 1.0)
     for _ in range(60):
-        wrong_low = _count_below(structure, z, p, low) > 0
-        wrong_high = _count_below(structure, z, p, high) == 0
+        wrong_low = count_below(structure, z, p, low) > 0
+        wrong_high = count_below(structure, z, p, high) == 0
         if not (wrong_low.any() or wrong_high.any()):
             break
         high = np.where(wrong_low, low, high)
@@ -306,15 +322,13 @@ def _polish(
 ) -> tuple[Values, Flags]:
     """Inverse iteration from a shift just below the smallest eigenvalue; where it converged."""
     n, mass = structure.unknowns, structure.mass
-    vector = np.tile(np.cos(1.7 * np.arange(n)) + 1.3, (len(z), 1))
+    vector = generic_vectors(structure, len(z))
     # an eigenvalue of zero lies on the bracket's end, where the matrix is singular
     bottom = low - 0.5 * (high - low)
     value, shift = 0.5 * (low + high), bottom.copy()
     good = np.zeros(len(z), bool)
     for sweep in range(POLISHING):
-        rhs = np.zeros((len(z), 1, structure.size))
-        rhs[:, 0, :n] = mass * vector
-        solved = structure.solve(z, p, rhs, shift=shift).x[:, 0, :n]
+        solved = inverse_step(structure, z, p, vector, shift)[:, :n]
         norm = np.sqrt(np.einsum("li,i,li->l", solved, mass, solved))
         # Rayleigh quotient of the new vector: (F_z − shift M) solved = M vector
         quotient = shift + np.einsum("li,i,li->l", solved, mass, vector) / norm**2
@@ -322,7 +336,7 @@ def _polish(
         vector = solved / norm[:, None]
         if sweep > 1:
             inside = (value >= low) & (value <= high) & np.isfinite(norm)
-            good = _has_converged(value, previous) & inside
+            good = (np.abs(value - previous) <= RELATIVE * np.maximum(np.abs(value), 1e-3)) & inside
             if good.all():
                 break
         # a shift equal to the eigenvalue would be singular: stay a little below
@@ -330,7 +344,3 @@ def _polish(
         closer = value - 1e-3 * (high - low)
         shift = np.where(near & (sweep > 2), np.maximum(closer, bottom), bottom)
     return np.asarray(value), good
-
-
-def _has_converged(value: Values, previous: Values) -> Flags:
-    return np.asarray(np.abs(value - previous) <= RELATIVE * np.maximum(np.abs(value), 1e-3))

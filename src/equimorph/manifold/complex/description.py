@@ -38,6 +38,7 @@ from equimorph.manifold.geometry.topology import (
 )
 from equimorph.model import Box, Constraint, worst_relative_excess
 from equimorph.structures import States
+from equimorph.structures.margin import count_below
 
 SHEETS_AT_A_CROSSING = 4
 """Cells around a facet in which two sheets cross."""
@@ -91,6 +92,13 @@ class Frame:
     box: Box
     fixed: Mapping[str, float]
     intervals: tuple[int, ...]
+
+
+COUNTED = (
+    "checked", "missing", "recovered", "descents", "left_out", "on_lines", "starts", "arrived",
+    "stopped", "cell_size", "touching", "accuracy", "deviation", "unrefined",
+)  # fmt: skip
+"""What was counted as a set was lifted, searched and refined; other cells do not change it."""
 
 
 @dataclass(frozen=True)
@@ -163,22 +171,8 @@ def describe_again(eset: EquilibriumSet, given: Complex, setting: Setting) -> Eq
     lifting = Lifting(**{each.name: getattr(audit, each.name) for each in fields(Lifting)})
     frame = Frame(setting, eset.mesh, eset.box, dict(eset.fixed), eset.intervals)
     out = describe(frame, given, lifting)
-    kept = replace(
-        out.audit,
-        checked=audit.checked,
-        missing=audit.missing,
-        recovered=audit.recovered,
-        descents=audit.descents,
-        left_out=audit.left_out,
-        on_lines=audit.on_lines,
-        stopped=audit.stopped,
-        cell_size=audit.cell_size,
-        touching=audit.touching,
-        accuracy=audit.accuracy,
-        deviation=audit.deviation,
-        unrefined=audit.unrefined,
-    )
-    return with_audit(out, kept)
+    kept = {name: getattr(audit, name) for name in COUNTED}
+    return with_audit(out, replace(out.audit, **kept))
 
 
 def _boundaries(
@@ -347,10 +341,8 @@ def contradictions(
     structure, singular = points.structure, are_singular(kinds)
     low, high = points.inertia[0].copy(), points.inertia[0].copy()
     z, p = points.z[singular], points.p[singular]
-    nothing, shift = np.zeros((len(z), 0, structure.size)), np.full(len(z), VANISHING)
-    for bound, sign in ((low, -1.0), (high, 1.0)):
-        solved = structure.solve(z, p, nothing, shift=sign * shift)
-        bound[singular] = solved.negative - structure.constraints
+    for bound, shift in ((low, -VANISHING), (high, VANISHING)):
+        bound[singular] = count_below(structure, z, p, shift)
     index = cell_index[:, None]
     return np.asarray(((index < low[cells]) | (index > high[cells])).any(axis=1))
 

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import brentq
 
-from equimorph.arrays import Float, Items, ItemValues
+from equimorph.arrays import Float, ItemValues
 from equimorph.equilibria.critical import Critical, null_border
 from equimorph.equilibria.settle import lower_index
 from equimorph.manifold.geometry.exact_points import Aim, Pinned, correct_points, pin_crossings
@@ -19,6 +19,7 @@ from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.lifting.pairing import Pairing
 from equimorph.manifold.lifting.polygon_cuts import MEETING, Chord, Plan, crossed_chords, planes
+from equimorph.structures.margin import count_below
 
 Ways = list[list[Chord]]
 
@@ -160,7 +161,7 @@ def _hub(pairing: Pairing, triangle: int, chord: Chord) -> int | None:
     span, rows = planes(pairing, [triangle]), (way / length)[None, None]
     sense = null_border(setting.structure, z[:1], p[:1])[0]
     quadratic, cubic = _coefficients(pairing, z, p, sense)
-    low, high = _negative(pairing, z, p).tolist()
+    low, high = count_below(setting.structure, z, p, -VANISHING).tolist()
     skew = (np.abs(quadratic) > SKEW * np.abs(cubic)).any()
     found: list[Pinned] = []
     known = {0.0: (z[0], p[0]), 1.0: (z[1], p[1])}
@@ -174,7 +175,7 @@ def _hub(pairing: Pairing, triangle: int, chord: Chord) -> int | None:
         found.append(pinned)
         known[share] = pinned.z[0], pinned.p[0]
         if low != high:
-            return float(_negative(pairing, pinned.z, pinned.p)[0] - low)
+            return float(count_below(setting.structure, pinned.z, pinned.p, -VANISHING)[0] - low)
         return float(_coefficients(pairing, pinned.z, pinned.p, sense)[1 - skew][0])
 
     def cubic_at(share: float) -> float:
@@ -234,15 +235,6 @@ def _refuse_two(ends: ItemValues, around: tuple[float, float]) -> None:
     """
     if ends[0] * ends[1] > 0.0 > around[0] * around[1]:
         raise _NoCrossingError
-
-
-def _negative(
-    pairing: Pairing, z: Float[np.ndarray, "n size"], p: Float[np.ndarray, "n P"]
-) -> Items:
-    """Negative eigenvalues at crossings but for the one that vanishes, however soft the others."""
-    structure = pairing.setting.structure
-    nothing, shift = np.zeros((len(z), 0, structure.size)), np.full(len(z), -VANISHING)
-    return np.asarray(structure.solve(z, p, nothing, shift=shift).negative)
 
 
 class _NoCrossingError(Exception):

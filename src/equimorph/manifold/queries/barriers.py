@@ -44,6 +44,7 @@ from equimorph.manifold.queries.barrier_landings import (
 )
 from equimorph.model import Descriptor, Progress, Silent
 from equimorph.structures import States
+from equimorph.structures.margin import count_below
 from equimorph.tolerances import SAME_PLACE, SAME_SOLUTION, SAME_STATE
 
 WIDTH = 1.0
@@ -294,9 +295,7 @@ class SetBarriers:
         """Which lanes without a saddle are on the edge of stability: they are its saddle."""
         structure, out = self.eset.structure, np.zeros(len(z), bool)
         some = np.flatnonzero(~np.isfinite(height))
-        nothing, shift = np.zeros((len(some), 0, structure.size)), np.full(len(some), CRITICAL)
-        count = structure.solve(z[some], p[some], nothing, shift=shift).negative
-        out[some] = count > structure.constraints
+        out[some] = count_below(structure, z[some], p[some], CRITICAL) > 0
         return out
 
     def _ends(self, over: StatesOver, saddles: Some) -> tuple[Ends, Flags]:

@@ -16,7 +16,7 @@ from equimorph.linalg import Border, BorderedSolution, no_border, solve_bordered
 from equimorph.linalg.condensed import REFINABLE
 from equimorph.linalg.determinants import no_determinants
 from equimorph.linalg.lanes import over_lanes
-from equimorph.structures.margin import stability_margin
+from equimorph.structures.margin import generic_vectors, inverse_step, stability_margin
 from equimorph.structures.rod.discretisation import Mesh
 from equimorph.structures.rod.ends import FREE, End
 from equimorph.structures.rod.lateral_kernels import lateral_lanes
@@ -253,11 +253,9 @@ class OutOfPlane:
         """
         value, n = self.margin(z, p), self.unknowns
         shift = value - BELOW * np.maximum(np.abs(value), 1.0)
-        x = np.tile(np.cos(1.7 * np.arange(self.size)) + 1.3, (len(z), 1))
+        x = generic_vectors(self, len(z))
         for _ in range(MODE_SWEEPS):
-            rhs = np.zeros((len(z), 1, self.size))
-            rhs[:, 0, :n] = self.mass * x[:, :n]
-            x = self.solve(z, p, rhs, shift=shift).x[:, 0]
+            x = inverse_step(self, z, p, x[:, :n], shift)
             x /= np.sqrt(x[:, :n] ** 2 @ self.mass)[:, None]
         half = self.mesh.integration(np.array([0.5]))[0]
         x *= np.where(x[:, 1:n:2] @ half > 0.0, -1.0, 1.0)[:, None]

@@ -12,6 +12,7 @@ from equimorph.manifold.geometry.setting import Setting
 from equimorph.manifold.queries.nearest import SetPoints
 from equimorph.model import Constraint, Descriptor
 from equimorph.structures import Structure, margin_of, value_of
+from equimorph.structures.margin import generic_vectors, inverse_step
 from equimorph.tasks.optimising.quadratic import QuadraticStep
 from equimorph.tasks.optimising.tangent_steps import (
     project_onto_set,
@@ -93,12 +94,10 @@ def nearest_eigenvalue(structure: Structure, z: Lanes, p: Parameters) -> Values:
     Near the stability boundary it is the margin to round-off; far from it, about as large.
     """
     n, mass = structure.unknowns, structure.mass
-    v = np.tile(np.cos(1.7 * np.arange(n)) + 1.3, (len(z), 1))
+    v = generic_vectors(structure, len(z))
     shift, value = np.full(len(z), SHIFT), np.zeros(len(z))
     for _ in range(SWEEPS):
-        rhs = np.zeros((len(z), 1, structure.size))
-        rhs[:, 0, :n] = mass * v
-        x = structure.solve(z, p, rhs, shift=shift).x[:, 0, :n]
+        x = inverse_step(structure, z, p, v, shift)[:, :n]
         size = x**2 @ mass
         value = SHIFT + np.einsum("li,i,li->l", x, mass, v) / size
         v = x / np.sqrt(size)[:, None]

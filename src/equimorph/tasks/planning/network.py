@@ -16,6 +16,7 @@ from equimorph.manifold.complex.kept_tables import from_cache
 from equimorph.manifold.geometry.topology import faces_of
 from equimorph.model import Constraint, are_feasible, ease
 from equimorph.structures import State, States, Structure, join_states
+from equimorph.structures.margin import count_below
 from equimorph.tasks.planning.objectives import ROUGH, Objective, Wish, objective_of
 from equimorph.tasks.route import FINE
 
@@ -86,11 +87,7 @@ class Demands:
 
     def admissible(self, states: States) -> Flags:
         """Whether states keep the margin (by one count of inertia) and the constraints."""
-        structure = states.structure
-        nothing = np.zeros((len(states), 0, structure.size))
-        shift = np.full(len(states), self.margin)
-        count = structure.solve(states.z, states.p, nothing, shift=shift).negative
-        good = np.asarray(count == structure.constraints)
+        good = np.asarray(count_below(states.structure, states.z, states.p, self.margin) == 0)
         good[good] = are_feasible(self.constraints, states.z[good], states.p[good])
         return good
 
