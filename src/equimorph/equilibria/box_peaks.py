@@ -219,8 +219,8 @@ class BoxPeaks:
         """Slopes of the value, and changes of the state, per half width of the box."""
         scale = self.sizes / self.structure.scales[self.places]
         dz, dp = answers(self.structure, at.z, at.p, self.places)
-        slope = slopes_along(self.structure, at.z, at.p, dz, dp, [self.descriptor])[:, 0]
-        return self.sign * slope * scale, dz * scale[:, None]
+        slope = slopes_along(self.structure, at.z, at.p, dz, dp, [self._values])[:, 0]
+        return slope * scale, dz * scale[:, None]
 
     def _starts(
         self, value: Float[np.ndarray, "lanes n"], slope: Float[np.ndarray, "lanes n k"]

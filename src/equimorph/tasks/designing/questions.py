@@ -201,7 +201,5 @@ def limit_piece(guess: State, load: str, met: Constraint | None) -> Piece | None
 
 def _slope(made: Structure, met: Constraint, here: Settled, along: Carried) -> float:
     """Slope of the excess over a constraint along the set."""
-    sign = 1.0 if met.sense == "<=" else -1.0
     ways = along.z[None], along.p[None]
-    found = slopes_along(made, here.z, here.p, *ways, [met.descriptor])
-    return sign * float(found[0, 0, 0])
+    return float(slopes_along(made, here.z, here.p, *ways, [met.excess])[0, 0, 0])

@@ -182,7 +182,8 @@ def linearise(
 ) -> Linearisation:
     """Linearise at states."""
     along = answers(structure, z, p, which)
-    return Linearisation(*along, slopes_along(structure, z, p, *along, descriptors))
+    functions = [each.function for each in descriptors]
+    return Linearisation(*along, slopes_along(structure, z, p, *along, functions))
 
 
 def shortest_change(

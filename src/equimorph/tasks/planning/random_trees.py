@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from equimorph.arrays import Float, Int, Lanes, Parameters, Values
+from equimorph.equilibria.sensitivity import slopes_along, tangents
 from equimorph.model import Box, Constraint
 from equimorph.structures import State, States
 
@@ -15,8 +16,6 @@ FINAL = 0.2
 
 Slopes = Float[np.ndarray, "lanes constraints directions"]
 
-STEP = 1e-5
-"""Step of the central differences along the set, in the units of the directions."""
 SWEEPS = 12
 """Rounds of projections onto all constraints in turn."""
 
@@ -162,24 +161,10 @@ def constraint_slopes(
     within: tuple[Constraint, ...],
 ) -> tuple[Float[np.ndarray, "lanes constraints"], Slopes]:
     """Excesses of constraints at states, and their slopes on the set along changes of p."""
-    structure, lanes = states.structure, len(states)
-    count = directions.shape[1]
-    columns = np.stack(
-        [
-            structure.parameter_derivative(states.z, states.p, directions[:, k])
-            for k in range(count)
-        ],
-        axis=1,
-    )
-    dz = -structure.solve(states.z, states.p, columns).x
-    sides = []
-    for sign in (STEP, -STEP):
-        z = (states.z[:, None] + sign * dz).reshape(lanes * count, -1)
-        p = (states.p[:, None] + sign * directions).reshape(lanes * count, -1)
-        each = [c.excess(z, p).reshape(lanes, count) for c in within]
-        sides.append(np.stack(each, axis=1))
-    here = np.stack([c.excess(states.z, states.p) for c in within], axis=1)
-    return here, (sides[0] - sides[1]) / (2.0 * STEP)
+    structure, z, p = states.structure, states.z, states.p
+    dz, excess = tangents(structure, z, p, directions), [each.excess for each in within]
+    here = np.stack([each(z, p) for each in excess], axis=1)
+    return here, slopes_along(structure, z, p, dz, directions, excess)
 
 
 def project_onto_constraints(

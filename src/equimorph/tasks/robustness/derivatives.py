@@ -8,10 +8,12 @@ import numpy as np
 from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Float
 from equimorph.equilibria import LimitLoad, check_start
+from equimorph.equilibria.critical import Critical, null_border
+from equimorph.equilibria.sensitivity import tangents
 from equimorph.equilibria.trace_options import VIOLATIONS
 from equimorph.errors import InputError
 from equimorph.model import Constraint, Descriptor, names_of, position
-from equimorph.structures import State, Structure
+from equimorph.structures import State
 
 STEP = 1e-5
 """Step of central differences along the set, in scaled parameters."""
@@ -79,14 +81,15 @@ def sensitivity(
     structure = state.structure
     chosen = tuple(names_of(structure.parameters) if names is None else names)
     at = [position(structure.parameters, name) for name in chosen]
-    g, _ = _null_vector(state)
-    if abs(g) < CRITICAL:
+    z, p = state.z[None], state.p[None]
+    beside = Critical(structure, z, p, null_border(structure, z, p))
+    if abs(beside.g[0]) < CRITICAL * np.linalg.norm(beside.v):
         raise InputError(
             f"`state` must be regular; got a critical one, {state}. See `limit_sensitivity`."
         )
     _check_pushes(state, chosen)
     directions = np.eye(len(structure.parameters))[at]
-    dz = _tangents(state, directions)
+    dz = tangents(structure, z, p, directions[None])[0]
     slopes = {each.name: _slopes(state, each, dz, directions) for each in descriptors}
     return Sensitivity(chosen, dz, slopes)
 
@@ -129,7 +132,7 @@ def limit_sensitivity(
     places = {name: position(structure.parameters, name) for name in (*names, load)}
     if limit.kind == "fold":
         _check_pushes(state, names)
-        _, phi = _null_vector(state)
+        phi = null_border(structure, state.z[None], state.p[None])[0]
         slopes = {name: float(phi @ _column(state, place)) for name, place in places.items()}
         size = np.linalg.norm(phi) * np.linalg.norm(_column(state, places[load]))
         if abs(slopes[load]) < FLAT * size:
@@ -169,15 +172,6 @@ def _check_pushes(state: State, names: Sequence[str]) -> None:
             )
 
 
-def _tangents(
-    state: State, directions: Float[np.ndarray, "k parameters"]
-) -> Float[np.ndarray, "k size"]:
-    structure, count = state.structure, len(directions)
-    z, p = np.tile(state.z, (count, 1)), np.tile(state.p, (count, 1))
-    columns = structure.parameter_derivative(z, p, directions)
-    return np.asarray(-structure.solve(state.z[None], state.p[None], columns[None]).x[0])
-
-
 def _slopes(
     state: State,
     descriptor: Descriptor,
@@ -200,19 +194,3 @@ def _column(state: State, place: int) -> Float[np.ndarray, " size"]:
     direction[0, place] = 1.0
     found = state.structure.parameter_derivative(state.z[None], state.p[None], direction)
     return np.asarray(found[0])
-
-
-def _null_vector(state: State) -> tuple[float, Float[np.ndarray, " size"]]:
-    """Test function g, zero at critical states, and the vector φ with F_z φ = −g b, b·φ = 1."""
-    structure: Structure = state.structure
-    b = np.cos(1.7 * np.arange(structure.size)) + 1.3
-    for _ in range(3):
-        column = (b / np.linalg.norm(b))[None, None]
-        rhs = np.zeros((1, 1, structure.size + 1))
-        rhs[0, 0, -1] = 1.0
-        border = (column, column, np.zeros((1, 1, 1)))
-        solved = structure.solve(state.z[None], state.p[None], rhs, border).x[0, 0]
-        phi, g = solved[:-1], float(solved[-1])
-        b = phi
-    size = float(np.linalg.norm(phi))
-    return g / size, phi / size
