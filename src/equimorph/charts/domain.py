@@ -13,7 +13,7 @@ from equimorph.charts.arrangement import cross, outline, winding
 from equimorph.charts.location import Cells, EdgeKind, facet_kinds
 from equimorph.charts.regions import Regions, regions_within
 from equimorph.manifold.geometry.simplices import volumes
-from equimorph.manifold.geometry.topology import keys_of, labels, pieces
+from equimorph.manifold.geometry.topology import labels, pieces, places_among
 from equimorph.manifold.lookup.cell_index import CellIndex
 
 Loop = Float[np.ndarray, "_ 2"]
@@ -288,12 +288,8 @@ def _domain_inside(cells: Cells, loops: tuple[Loop, ...], drawn: Int[np.ndarray,
     """Domain inside loops, whose edges lie on those of the cells' outlines."""
     kept = without_slivers(loops, typical_extent(cells))
     facets, kinds = facet_kinds(cells)
-    base = len(cells.eset.points)
-    keys = keys_of(facets, base)
-    order = np.argsort(keys)
-    own = keys_of(drawn, base)
-    at = order[np.minimum(np.searchsorted(keys, own, sorter=order), len(keys) - 1)]
-    of_drawn = np.where(keys[at] == own, kinds[at], EdgeKind.SINGULAR)
+    at = places_among(drawn, facets, len(cells.eset.points))
+    of_drawn = np.where(at >= 0, kinds[at], EdgeKind.SINGULAR)
     ends = cells.values[drawn]
     along = tuple(kinds_along(loop, ends, of_drawn) for loop in kept)
     return Domain(cells.coordinates.names, kept, along)

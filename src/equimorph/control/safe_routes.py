@@ -5,13 +5,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from equimorph.arrays import Int, Some, Values
+from equimorph.arrays import Int, Values
 from equimorph.control.likely_loads import REACH, Bundles, LikelyLoads, move_states, positions
 from equimorph.equilibria import TraceOptions
 from equimorph.linalg.graphs import shortest_path
 from equimorph.manifold import EquilibriumSet, equilibrium_set
 from equimorph.manifold.complex.kept_tables import from_cache
-from equimorph.manifold.geometry.topology import labels
+from equimorph.manifold.geometry.topology import flags_of, labels
 from equimorph.model import names_of
 from equimorph.structures import States, join_states
 from equimorph.tasks.planning.network import (
@@ -177,7 +177,8 @@ def _cheapest(nodes: Bundles, pairs: Pairs, likely: LikelyLoads) -> Int[np.ndarr
         path = shortest_path(count, pairs, weights, (count - 2, count - 1))
         if path is None:
             return None
-        used = _along(pairs, path)
+        steps = np.stack([path[:-1], path[1:]], axis=1)
+        used = np.flatnonzero(flags_of(pairs, steps))
         fresh = used[~lifted[used]]
         good = likely.can_move(*(nodes.take(side) for side in pairs[fresh].T))
         lifted[fresh] = True
@@ -186,13 +187,6 @@ def _cheapest(nodes: Bundles, pairs: Pairs, likely: LikelyLoads) -> Int[np.ndarr
         keep = np.ones(len(pairs), bool)
         keep[fresh[~good]] = False
         pairs, weights, lifted = pairs[keep], weights[keep], lifted[keep]
-
-
-def _along(pairs: Pairs, path: Int[np.ndarray, " path"]) -> Some:
-    """Numbers of the pairs that follow each other on a path."""
-    steps = np.sort(np.stack([path[:-1], path[1:]], axis=1), axis=1)
-    code = np.array([1 + max(pairs.max(initial=0), steps.max(initial=0)), 1])
-    return np.flatnonzero(np.isin(np.sort(pairs, axis=1) @ code, steps @ code))
 
 
 def _costs(nodes: Bundles, pairs: Pairs) -> Values:

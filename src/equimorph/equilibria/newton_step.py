@@ -172,7 +172,8 @@ class Points(Columns):
         here = self if whole else self.take(some)
         problem, b, rows = here.problem, here.b, here.rows
         if step.null is not None:
-            b = _unit(step.null if whole else step.null[some])
+            null = step.null if whole else step.null[some]
+            b = np.ascontiguousarray(null / np.linalg.norm(null, axis=1, keepdims=True))
         if isinstance(problem.frame, Tangents) and problem.width:
             along = step.tangent.along if whole else step.tangent.along[some]
             rows = along * weights_of(problem.structure, along.shape[2])
@@ -325,10 +326,6 @@ def _amount(
     return amount
 
 
-def _unit(v: Lanes) -> Lanes:
-    return np.ascontiguousarray(v / np.linalg.norm(v, axis=1, keepdims=True))
-
-
 def free_directions(structure: Structure, free: Int[np.ndarray, "*_ k"], lanes: int) -> Directions:
     """Directions in which parameters change by their scales: the same for all lanes, or of each."""
     k = free.shape[-1]
@@ -336,6 +333,14 @@ def free_directions(structure: Structure, free: Int[np.ndarray, "*_ k"], lanes: 
     lane = slice(None) if free.ndim == 1 else np.arange(lanes)[:, None]
     out[lane, np.arange(k), free] = structure.scales[free]
     return out
+
+
+def metric_places(
+    structure: Equations, z: Lanes, p: Parameters
+) -> Float[np.ndarray, "lanes coordinates"]:
+    """Configurations in the metric and scaled parameters: Euclidean distances measure."""
+    u = z[:, : structure.unknowns] * np.sqrt(structure.mass)
+    return np.concatenate([u, p / structure.scales], axis=1)
 
 
 def distances(

@@ -3,6 +3,7 @@
 import numpy as np
 
 from equimorph.arrays import Float, Int, Values
+from equimorph.equilibria.newton_step import metric_places
 from equimorph.equilibria.settle import distances
 from equimorph.linalg.apart import firsts_apart
 from equimorph.structures import State, States
@@ -27,7 +28,4 @@ def path_lengths(states: States) -> Values:
 
 def distinct(states: States, tolerance: float) -> Int[np.ndarray, " distinct"]:
     """Numbers of the states that lie further than a tolerance from all earlier ones of these."""
-    structure = states.structure
-    u = states.z[:, : structure.unknowns] * np.sqrt(structure.mass)
-    places = np.concatenate([u, states.p / structure.scales], axis=1)
-    return firsts_apart(places, tolerance)
+    return firsts_apart(metric_places(states.structure, states.z, states.p), tolerance)

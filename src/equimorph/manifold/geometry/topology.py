@@ -112,6 +112,16 @@ def among(keys: Items, known: Int[np.ndarray, " m"]) -> ItemFlags:
     return np.asarray(known[at] == keys)
 
 
+def places_among(rows: Int[np.ndarray, "n k"], known: Int[np.ndarray, "m k"], base: int) -> Items:
+    """Place of each row of vertices below `base` among known rows; −1 for none."""
+    sought, keys = keys_of(rows, base), keys_of(known, base)
+    if len(keys) == 0:
+        return np.full(len(sought), -1)
+    order = np.argsort(keys)
+    at = order[np.minimum(np.searchsorted(keys[order], sought), len(keys) - 1)]
+    return np.where(keys[at] == sought, at, -1)
+
+
 def count_corners(chosen: VertexFlags, cells: Int[np.ndarray, "n corners"]) -> Items:
     """How many corners of each cell are among the chosen vertices.
 

@@ -18,7 +18,7 @@ from equimorph.manifold.geometry.exact_points import pin
 from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.simplices import shares_in
 from equimorph.manifold.geometry.tangents import fold_forms
-from equimorph.manifold.geometry.topology import labels
+from equimorph.manifold.geometry.topology import labels, places_among
 from equimorph.manifold.lifting.courses import Courses, on_sides
 from equimorph.manifold.lifting.grid import NEAR_AN_END
 from equimorph.manifold.lifting.pairing import Pairing
@@ -81,11 +81,9 @@ def chords_across(
     if len(owner) == 0:
         return ends[:0], owner
     sides, base = np.sort(mesh.sides[owner], axis=1), len(mesh.edges)
-    keys = np.concatenate([sides[:, a] * base + sides[:, b] for a, b in ((0, 1), (1, 2), (0, 2))])
-    order = np.argsort(keys)
-    sought = edge.min(axis=1) * base + edge.max(axis=1)
-    at = order[np.minimum(np.searchsorted(keys[order], sought), len(order) - 1)]
-    good = keys[at] == sought
+    pairs = np.concatenate([sides[:, pair] for pair in ([0, 1], [1, 2], [0, 2])])
+    at = places_among(edge, pairs, base)
+    good = at >= 0
     return ends[good], np.tile(owner, 3)[at[good]]
 
 

@@ -20,7 +20,7 @@ from equimorph.manifold.geometry.crossings import Reduction, reduction
 from equimorph.manifold.geometry.points import Points
 from equimorph.manifold.geometry.quadratics import least_in_simplex, monomials
 from equimorph.manifold.geometry.setting import Setting, embed
-from equimorph.manifold.geometry.topology import keys_of
+from equimorph.manifold.geometry.topology import places_among
 from equimorph.manifold.lifting.cells import Cells
 from equimorph.manifold.lifting.kernels import slope_squares, square_gaps
 from equimorph.manifold.lifting.pairing import Pairing
@@ -288,11 +288,8 @@ def _pairs(pairing: Pairing, cells: Cells, wanted: Some) -> _Pairs:
     order = np.argsort(vertex[plain], axis=1)
     vertex = np.take_along_axis(vertex[plain], order, axis=1)
     corners = np.take_along_axis(corners[plain], order, axis=1)
-    index, keys = cells.index[plain], keys_of(grid, base)
-    by_key = np.argsort(keys)
-    at = np.searchsorted(keys[by_key], keys_of(vertex, base))
-    owner = by_key[np.minimum(at, len(by_key) - 1)] if len(by_key) else at
-    good = (grid[owner] == vertex).all(axis=1)
+    index, owner = cells.index[plain], places_among(vertex, grid, base)
+    good = owner >= 0
     corners, index, owner = corners[good], index[good], owner[good]
     by_owner = np.argsort(owner, kind="stable")
     corners, index, owner = corners[by_owner], index[by_owner], owner[by_owner]

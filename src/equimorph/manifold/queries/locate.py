@@ -7,7 +7,9 @@ import numpy as np
 
 from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Flags, Float, Int, Lanes, Parameters
+from equimorph.equilibria.newton_step import metric_places
 from equimorph.errors import InputError
+from equimorph.linalg.apart import firsts_apart
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.manifold.geometry.topology import faces_of
 from equimorph.manifold.lookup.exact_states import StatesOver
@@ -151,7 +153,7 @@ class ValueFit:
             if what not in measured or not 0.0 < float(error) < np.inf:
                 raise InputError(
                     "`errors` must be positive and of measured values; "
-                    f"got {_name(what)}: {error!r}."
+                    f"got {getattr(what, 'name', what)}: {error!r}."
                 )
             units[what] = float(error)
         return cls(eset, measured, units)
@@ -216,21 +218,13 @@ def _check_values(eset: EquilibriumSet, measured: Mapping[Descriptor | str, floa
             )
 
 
-def _name(what: Descriptor | str) -> str:
-    return what if isinstance(what, str) else what.name
-
-
 def distinct_states(
     structure: Structure, found: SetPoints, value: Float[np.ndarray, " lanes"]
 ) -> Int[np.ndarray, " kept"]:
     """Different states, the best first."""
-    kept: list[int] = []
-    for lane in np.argsort(value, kind="stable"):
-        gap = (found.z[kept] - found.z[lane])[:, : structure.unknowns] ** 2 @ structure.mass
-        gap += (((found.p[kept] - found.p[lane]) / structure.scales) ** 2).sum(axis=1)
-        if np.sqrt(gap).min(initial=np.inf) > SAME_SOLUTION:
-            kept.append(int(lane))
-    return np.array(kept, dtype=int)
+    order = np.argsort(value, kind="stable")
+    places = metric_places(structure, found.z, found.p)[order]
+    return np.asarray(order[firsts_apart(places, SAME_SOLUTION)])
 
 
 def _places(

@@ -9,6 +9,7 @@ from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import cKDTree
 
 from equimorph.arrays import Float, Int, Values
+from equimorph.equilibria.newton_step import metric_places
 from equimorph.linalg.graphs import graph_of, walk_back
 from equimorph.manifold import EquilibriumSet
 from equimorph.structures import States
@@ -83,9 +84,10 @@ class _Trees:
         """Node with the cheapest path over it, of those that lie apart from given paths."""
         near = np.flatnonzero(self.over <= (1.0 + DETOUR) * best)
         near = near[np.isfinite(self.over[near])]
-        place = metric_places(states[near]) if before else np.zeros((len(near), 0))
+        structure = states.structure
+        place = metric_places(structure, states.z[near], states.p[near])
         for path in before:
-            apart = cKDTree(metric_places(path)).query(place)[0] > APART * best
+            apart = cKDTree(metric_places(structure, path.z, path.p)).query(place)[0] > APART * best
             near, place = near[apart], place[apart]
         return int(near[self.over[near].argmin()]) if len(near) else None
 
@@ -99,10 +101,3 @@ class _Trees:
         assert there is not None
         assert back is not None
         return np.concatenate([there, back[-2::-1]])
-
-
-def metric_places(states: States) -> Float[np.ndarray, "lanes coordinates"]:
-    """Configurations in the metric and scaled parameters."""
-    structure = states.structure
-    u = states.z[:, : structure.unknowns] * np.sqrt(structure.mass)
-    return np.concatenate([u, states.p / structure.scales], axis=1)

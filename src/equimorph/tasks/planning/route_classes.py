@@ -16,6 +16,7 @@ from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Bool, Edges, Float, Int
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.complex.kept_tables import from_cache
+from equimorph.manifold.geometry.topology import places_among
 from equimorph.model import Constraint, Descriptor
 from equimorph.structures import State, States, join_states
 from equimorph.tasks.planning.kernels import search_classes
@@ -259,11 +260,8 @@ def cocycles(count: int, edges: Edges, triangles: Triangles) -> Values:
     for [EricksonWhittlesey2005]_; the edges in neither tree generate. Vertices of edges and
     triangles are in growing order; at most two triangles are at an edge.
     """
-    code = np.array([count, 1])
     sides = np.stack([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [0, 2]]], axis=1)
-    keys = edges @ code
-    order = np.argsort(keys)
-    places = order[np.searchsorted(keys[order], sides @ code)]
+    places = places_among(sides.reshape(-1, 2), edges, count).reshape(-1, 3)
     surface = _Surface(edges, triangles, places)
     tree = _spanning(count, edges)
     parent, depth = _dual_tree(surface, tree)
@@ -333,10 +331,7 @@ def signature(
     count: int, edges: Edges, values: Values, path: Int[np.ndarray, " n"]
 ) -> tuple[int, ...]:
     """Class of a path over edges."""
-    code = np.array([count, 1])
-    keys = edges @ code
-    order = np.argsort(keys)
     steps = np.stack([path[:-1], path[1:]], axis=1)
-    places = order[np.searchsorted(keys[order], np.sort(steps, axis=1) @ code)]
+    places = places_among(steps, edges, count)
     signs: Float[np.ndarray, " n"] = np.where(steps[:, 0] < steps[:, 1], 1, -1)
     return tuple((signs[:, None] * values[places]).sum(axis=0).astype(int).tolist())

@@ -9,11 +9,11 @@ from itertools import pairwise
 import numpy as np
 
 from equimorph.arrays import Flags, Parameters, Values
+from equimorph.equilibria.newton_step import metric_places
 from equimorph.equilibria.soft_modes import metric_length
 from equimorph.manifold import EquilibriumSet, Snap
 from equimorph.manifold.queries.nearest import Ground, SetPoints, points_at_vertices
 from equimorph.structures import State, States, join_states
-from equimorph.tasks.planning.mesh_paths import metric_places
 from equimorph.tasks.planning.network import MATCH, Demands, lift_straight
 from equimorph.tolerances import SAME_STATE
 
@@ -99,8 +99,8 @@ def _vertices(eset: EquilibriumSet, snap: Snap, demands: Demands) -> tuple[SetPo
 def _with_place(folds: SetPoints, landings: States, known: SnapPlace) -> tuple[SetPoints, States]:
     """Folds in order, and landings, with a known place where it makes their chain least longer."""
     structure, fold, landed = landings.structure, known.fold, known.landing
-    place = metric_places(States(structure, folds.z, folds.p))
-    gap = np.linalg.norm(place - metric_places(fold.batch), axis=1)
+    place = metric_places(structure, folds.z, folds.p)
+    gap = np.linalg.norm(place - metric_places(structure, fold.batch.z, fold.batch.p), axis=1)
     if gap.min() < SAME_STATE:
         return folds, landings
     longer = gap[:-1] + gap[1:] - np.linalg.norm(np.diff(place, axis=0), axis=1)
