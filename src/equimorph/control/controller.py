@@ -349,7 +349,7 @@ class Controller:
         changed = self._replan(belief, likely, place)
         if changed.status == ControlStatus.REPLANNED:
             return changed
-        words = _words(belief.way_points[0])
+        words = ", ".join(f"{name} = {value:.6g}" for name, value in belief.way_points[0].items())
         return replace(changed, why=f"no stride towards {words} is safe; {changed.why}")
 
     def _track(self, belief: Belief, likely: LikelyLoads, place: Bundles, ahead: Step) -> Belief:
@@ -376,10 +376,6 @@ class Controller:
             return replace(belief, status=ControlStatus.NO_SAFE_WAY, why=why)
         unchecked = np.full(len(self._loads), np.inf)
         return replace(belief, state=there, status=ControlStatus.RETREATING, checked=unchecked)
-
-
-def _words(point: Command) -> str:
-    return ", ".join(f"{name} = {value:.6g}" for name, value in point.items())
 
 
 def _check_sizes(argument: str, named: Mapping[str, float]) -> None:

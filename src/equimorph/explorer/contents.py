@@ -176,7 +176,9 @@ def contents(asked: Question) -> tuple[dict[str, Any], Arrays]:
     }  # fmt: skip
     arrays: Arrays = {
         "places": states.p[:, eset.setting.free].astype(np.float32),
-        "index": np.minimum(_index(eset, states), 255).astype(np.uint8),
+        "index": np.minimum(
+            np.concatenate([eset.index, states[len(eset.points) :].index]), 255
+        ).astype(np.uint8),
         "cells": eset.cells.astype(np.int32),
         "cell_index": np.minimum(eset.cell_index, 255).astype(np.uint8),
         "bent": middles.ends.astype(np.int32),
@@ -214,11 +216,6 @@ class _States:
     def all(self) -> States:
         """Every state, in order."""
         return join_states(self._parts[0].structure, self._parts)
-
-
-def _index(eset: EquilibriumSet, states: States) -> Int[np.ndarray, " lanes"]:
-    """Index of every state: on folds that of the lower side."""
-    return np.concatenate([eset.index, states[len(eset.points) :].index])
 
 
 def _parameters(eset: EquilibriumSet) -> list[dict[str, Any]]:

@@ -138,7 +138,8 @@ def energy_path(path: EnergyPath, ax: Axes | None = None, *, shapes: bool = True
         ax.plot(path.length, path.states.energy, color=style.INK, linewidth=1.2, zorder=2)
         marks = []
         for states, colour in ((minima, _STABLE), (saddles, _SADDLE)):
-            at = np.array([_place(path, z) for z in states.z], dtype=float)
+            near = [np.abs(path.states.z - z).max(axis=1).argmin() for z in states.z]
+            at = path.length[np.array(near, int)]
             ax.plot(at, states.energy, "o", color=colour, mec=style.INK, **_DOT)
             marks.append(at)
         ax.margins(y=_HEADROOM)
@@ -242,11 +243,6 @@ _PASS: dict[str, Any] = {
     "linestyle": (0, (4, 2)),
     "label": "two lowest passes swap",
 }
-
-
-def _place(path: EnergyPath, z: Float[np.ndarray, " size"]) -> float:
-    """Length of the path up to one of its states."""
-    return float(path.length[np.abs(path.states.z - z).max(axis=1).argmin()])
 
 
 def _energy_label(states: States) -> str:

@@ -103,7 +103,8 @@ class Schema:
         here = {change.renamed.get(name, name): value for name, value in values.items()
                 if name not in change.removed}  # fmt: skip
         known = {each.name: each for each in self.fields}
-        missing = known.keys() - here.keys() - {n for n, each in known.items() if _optional(each)}
+        needed = {n for n, each in known.items() if each.default is each.default_factory is MISSING}
+        missing = needed - here.keys()
         filled = {name: change.added[name] for name in missing if name in change.added}
         strange, lacking = sorted(here.keys() - known.keys()), sorted(missing - filled.keys())
         if version > change.version or strange or lacking:
@@ -164,7 +165,3 @@ def _dataclasses(package: ModuleType) -> list[type]:
                   if isinstance(each, type) and is_dataclass(each)
                   and each.__module__ == module.name]  # fmt: skip
     return found
-
-
-def _optional(each: Field[Any]) -> bool:
-    return each.default is not MISSING or each.default_factory is not MISSING

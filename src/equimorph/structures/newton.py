@@ -6,7 +6,7 @@ further conditions by it, and structures their natural states.
 See docs/decisions.md, "One corrector".
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
 from typing import Protocol, runtime_checkable
@@ -76,16 +76,10 @@ class Limits:
     def take(self, some: Numbers) -> "Limits":
         """Limits of some of the lanes."""
         too_long, exempt = self.too_long, self.exempt
-        return Limits(
-            self.iterations,
-            self.longest,
-            too_long[some] if isinstance(too_long, np.ndarray) else too_long,
-            self.converged,
-            self.following,
-            self.contraction,
-            self.free,
-            None if exempt is None else exempt[some],
-            self.multipliers,
+        return replace(
+            self,
+            too_long=too_long[some] if isinstance(too_long, np.ndarray) else too_long,
+            exempt=None if exempt is None else exempt[some],
         )
 
     def too_long_of(self, lanes: int) -> Values:

@@ -274,7 +274,9 @@ def _plain(value: Any, depth: int = 0) -> Any:
 def _inside(value: Any, depth: int) -> Any:
     """Plain parts of what holds values: a mapping, a list, a record."""
     if isinstance(value, Mapping):
-        pairs = {_name(key): _plain(inner, depth + 1) for key, inner in value.items()}
+        pairs = {
+            str(getattr(key, "name", key)): _plain(inner, depth + 1) for key, inner in value.items()
+        }
         return pairs if len(pairs) <= LONGEST else None
     if isinstance(value, tuple | list):
         return [_plain(inner, depth + 1) for inner in value] if len(value) <= LONGEST else None
@@ -292,8 +294,3 @@ def _of_state(state: State) -> dict[str, Any]:
         "margin": _plain(float(state.margin)),
         "energy": _plain(float(state.energy)),
     }
-
-
-def _name(key: Any) -> str:
-    """Key of a table: the name of a descriptor, or what is written."""
-    return str(getattr(key, "name", key))

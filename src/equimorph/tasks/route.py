@@ -194,7 +194,7 @@ def verify_route(
     path = None if corners is None else lift_legs(corners, within, FINE)
     if path is None:
         path = lift(start, way_points, within=within, options=FINE)
-    names = _moved_names(way_points)
+    names = list(dict.fromkeys(name for corner in way_points for name in corner))
     end = path.end
     if end.kind != "arrived":
         return refusal(_reason(path, names, len(way_points)), way_points, path)
@@ -212,10 +212,6 @@ def verify_route(
     schedule = schedule_of(path, margins, (*(c.descriptor for c in within), *monitor))
     length = float(path.length[-1])
     return Route("arrived", "", way_points, path, float(margins.min()), length, schedule)
-
-
-def _moved_names(way_points: Corners) -> list[str]:
-    return list(dict.fromkeys(name for corner in way_points for name in corner))
 
 
 def _reason(path: Path, names: Sequence[str], segments: int) -> str:

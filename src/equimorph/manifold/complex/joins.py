@@ -44,7 +44,9 @@ def joined(whole: Complex, same: Pairs, rank: VertexNumbers) -> Complex:
     known = adjacency(cells)
     between = known.across[index[known.links[:, 0]] != index[known.links[:, 1]]]
     left = known.facets[between]
-    left = left[flags_of(left, _facets(gone))]
+    left = left[
+        flags_of(left, np.concatenate([np.delete(gone, k, axis=1) for k in range(gone.shape[1])]))
+    ]
     used, numbered = np.unique(cells, return_inverse=True)
     number = np.full(len(one), -1)
     number[used] = np.arange(len(used))
@@ -57,11 +59,6 @@ def joined(whole: Complex, same: Pairs, rank: VertexNumbers) -> Complex:
         whole, points=whole.points[used], **columns, cells=numbered.reshape(cells.shape),
         cell_index=index, **marked,
     )  # fmt: skip
-
-
-def _facets(cells: Int[np.ndarray, "cells corners"]) -> Facets:
-    """All facets of some cells."""
-    return np.concatenate([np.delete(cells, k, axis=1) for k in range(cells.shape[1])])
 
 
 def _distinct(rows: Facets) -> ItemFlags:

@@ -71,7 +71,7 @@ def check(
     """
     progress.report("independent checks", 0, points)
     chosen = [
-        _in_the_box(eset, generator)
+        np.asarray(generator.uniform(eset.box.lower, eset.box.upper))
         if number % 2 == 1 or len(eset.cells) == 0
         else _below(eset, generator)
         for number in range(points)
@@ -203,10 +203,6 @@ def _lacking(found: States, eset: EquilibriumSet) -> States:
 def _below(eset: EquilibriumSet, generator: np.random.Generator) -> Float[np.ndarray, " d"]:
     cell = eset.cells[generator.integers(len(eset.cells))]
     return np.asarray(generator.dirichlet(np.ones(len(cell))) @ eset.coordinates[cell])
-
-
-def _in_the_box(eset: EquilibriumSet, generator: np.random.Generator) -> Float[np.ndarray, " d"]:
-    return np.asarray(generator.uniform(eset.box.lower, eset.box.upper))
 
 
 def seeds_from(

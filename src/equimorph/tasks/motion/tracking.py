@@ -194,7 +194,7 @@ def track(  # the knobs of the public face, all by keyword
     limits = dict(actuators) if isinstance(actuators, Mapping) else {}
     bounds = actuator_bounds(state.structure, limits)
     check_stable("start", state)
-    legs = _list_legs(targets)
+    legs = [targets] if isinstance(targets, Mapping) or callable(targets) else list(targets)
     asked = _descriptors([_check_values(leg(0.0) if callable(leg) else leg, names) for leg in legs])
     motion = _Motion(state, legs, names, tuple(within), limits, bounds)
     path = motion.path()
@@ -289,10 +289,6 @@ class _Motion:
         # the end itself may lie on a fold, where the actuators are no coordinates
         begin = path.states[-2 if len(path.states) > 1 else -1]
         return follow_minimum(problem, begin, float(path.at[-1]))
-
-
-def _list_legs(targets: Leg | Sequence[Leg]) -> list[Leg]:
-    return [targets] if isinstance(targets, Mapping) or callable(targets) else list(targets)
 
 
 def _free_actuators(leg: Leg, actuators: tuple[str, ...]) -> Leg:

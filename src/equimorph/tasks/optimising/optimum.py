@@ -194,7 +194,7 @@ def optimise(  # the knobs of the public face, all by keyword
     if fault:
         return _refusal(fault, sense, eset)
     programme = Programme.over(eset, goal, (*constraints, stability(eset.structure, margin)))
-    watched = _vertex_constraints(programme, constraints, margin)
+    watched = constraints if margin == 0.0 else (*constraints, programme.constraints[-1])
     ground, least = None, None
     if start is None:
         starts, least = _starts(eset, programme, watched)
@@ -240,13 +240,6 @@ def _nothing(within: Sequence[Constraint], least: FeasibleStarts | None) -> str:
     if least is None or not np.isfinite(least.least):
         return why
     return f"{why}; the least largest excess over the bounds is {least.least:.3g}"
-
-
-def _vertex_constraints(
-    programme: Programme, constraints: tuple[Constraint, ...], margin: float
-) -> tuple[Constraint, ...]:
-    """Constraints for the vertices, all of which are stable."""
-    return constraints if margin == 0.0 else (*constraints, programme.constraints[-1])
 
 
 def _starts(

@@ -224,7 +224,7 @@ def retime(
         return done
     met = np.interp(number, np.arange(len(corners)), motion.corner_times)
     met[0], met[-1] = 0.0, motion.duration
-    marks = _nearest(inner, met)
+    marks = np.unique(np.abs(inner[:, None] - met).argmin(axis=0))
     timed = _schedule_in_time(done, values, times, marks)
     if motion.windows:
         timed = replace(timed, velocities=motion.at(inner, 1) / stretch)
@@ -356,12 +356,6 @@ def _sample_times(duration: float, sampling: float | None) -> Float[np.ndarray, 
     if sampling is None:
         return np.linspace(0.0, duration, SAMPLES + 1)
     return np.arange(max(1, int(np.ceil(duration * sampling - EXACT))) + 1) / sampling
-
-
-def _nearest(
-    times: Float[np.ndarray, " samples"], wanted: Float[np.ndarray, " some"]
-) -> Int[np.ndarray, " marks"]:
-    return np.unique(np.abs(times[:, None] - wanted).argmin(axis=0))
 
 
 def _schedule_in_time(
