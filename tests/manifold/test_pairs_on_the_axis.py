@@ -6,6 +6,7 @@ import pytest
 import equimorph as em
 from equimorph.manifold import VertexKind
 from equimorph.manifold.lifting.seeds import is_symmetric
+from equimorph.manifold.lifting.spheres import Closed, part
 from equimorph.manifold.question import setting_of
 from oracles.complexes import assert_crossings
 from oracles.kirchhoff import clamped_buckling_moment
@@ -71,6 +72,41 @@ def test_the_set_over_twist_and_tension_buckles_along_greenhills_curve(rod):
     assert len(eset.crossings) == 1
     met = eset.points[eset.kinds == VertexKind.CROSSING]
     for tension, twist in zip(-met["P"] * 4.0 * np.pi**2, met["twist_B"], strict=True):
+        assert 3.0 * twist == pytest.approx(clamped_buckling_moment(tension), rel=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("crossed", "above", "whole"), [(True, 2, True), (True, 3, False), (False, 2, False)]
+)
+def test_spheres_are_parted_where_a_pair_vanishes_on_a_crossing(crossed, above, whole):
+    """Two pyramids on one triangle: over a fold a single eigenvalue changes its sign."""
+    sides = np.array([[0, 1, 3], [1, 2, 3], [2, 0, 3], [0, 1, 4], [1, 2, 4], [2, 0, 4]])
+    index, nothing = np.repeat([0, above], 3), np.zeros(0, int)
+    met = np.zeros((6, 3), bool)
+    met[:, 0] = crossed
+    none = np.full(6, -1)
+    sphere = Closed(sides, index, np.zeros(6, int), none, met, np.zeros(1, int), nothing)
+    assert part(sphere, np.arange(5.0)).whole.tolist() == [whole]
+
+
+@pytest.mark.slow
+def test_greenhills_curve_is_a_surface_over_both_twists(rod):
+    """Three free parameters: the moment depends on the difference of the twists alone; C = 3.
+
+    Tolerance: as before.
+    """
+    box, within = (
+        em.Box(P=(-0.6, -0.1), twist_A=(0.0, 0.2), twist_B=(2.2, 3.8)),
+        [rod.max_curvature <= 8.0],
+    )
+    eset = em.equilibrium_set(rod, box, within=within, intervals=(2, 2, 3), checks=0)
+    assert eset.audit.clean
+    assert_crossings(eset, vanishing=2)
+    assert sorted(piece.index for piece in eset.strata) == [0, 0, 0, 2]
+    assert len(eset.crossings) == 1
+    met = eset.points[eset.kinds == VertexKind.CROSSING]
+    twists = met["twist_B"] - met["twist_A"]
+    for tension, twist in zip(-met["P"] * 4.0 * np.pi**2, twists, strict=True):
         assert 3.0 * twist == pytest.approx(clamped_buckling_moment(tension), rel=1e-7)
 
 

@@ -9,7 +9,14 @@ import numpy as np
 
 from equimorph.arrays import Bool, Float, Int, ItemFlags, Items, ItemValues, Triples
 from equimorph.manifold.geometry.simplices import volumes
-from equimorph.manifold.geometry.topology import adjacency, distinct, keys_of, labels, orientation
+from equimorph.manifold.geometry.topology import (
+    PAIR,
+    adjacency,
+    distinct,
+    keys_of,
+    labels,
+    orientation,
+)
 from equimorph.manifold.lifting.surfaces import Surfaces, rings
 
 
@@ -139,7 +146,7 @@ def part(closed: Closed, marks: Float[np.ndarray, " points"]) -> Parts:
     curve_met = np.zeros(len(curve_surface), bool)
     curve_met[curves.label] = met[folded]
     jumps = np.abs(index[pairs[folded, 0]] - index[pairs[folded, 1]])
-    fits = np.where(curve_met[curves.label], met[folded] & (jumps <= 1), jumps == 1)
+    fits = np.where(curve_met[curves.label], met[folded] & (jumps <= PAIR), jumps == 1)
     whole = curves.closed & (_characteristics(closed, base) == 2)
     whole &= np.bincount(region_surface, minlength=count) == curves.amount + 1
     whole[fold_surface[~fits | (met[folded] != curve_met[curves.label])]] = False
