@@ -30,6 +30,7 @@ from equimorph.tasks.planning.network import (
 )
 from equimorph.tasks.planning.objectives import Wish
 from equimorph.tasks.planning.straightening import (
+    chain_cost,
     check_ends,
     follow_direction,
     order_ends,
@@ -42,6 +43,9 @@ from equimorph.tasks.start import check_two_parameters
 
 MOST_TURNS = 2
 """How often a path may pass around one hole."""
+SPARE, UNSURE = 2, 1.15
+"""Further classes whose best paths over the mesh are straightened, too, and up to which ratio of
+costs: ways over the mesh are too long by different amounts, and may come in another order."""
 LABELS = 8
 """Classes that are kept at a vertex, for each requested route."""
 
@@ -105,8 +109,12 @@ def alternatives(
     best, failed = list[Route](), list[Route]()
     for tightened in demands.with_reserves(min(end.margin for end in ends)):
         classes = _Classes(eset, order_ends(ends), tightened)
-        paths = classes.paths(count)
+        paths = classes.paths(count + SPARE)
+        rough = np.array([chain_cost(each, tightened) for each in paths])
+        most = np.sort(rough)[:count].max(initial=0.0)
+        paths = [each for each, cost in zip(paths, rough, strict=True) if cost <= UNSURE * most]
         corners = straight_corners(eset, paths, tightened, same_class=True)
+        corners = sorted(corners, key=lambda each: chain_cost(each, tightened))[:count]
         routes = [
             route_over_corners(eset, follow_direction(each, ends), demands, monitor)
             for each in corners

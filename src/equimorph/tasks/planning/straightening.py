@@ -314,6 +314,12 @@ def _cheapest_corners(
     return min(ways, key=lambda way: _total(way, demands))
 
 
+def chain_cost(corners: States, demands: Demands) -> float:
+    """Cost along the chords from corner to corner."""
+    at = np.arange(len(corners) - 1)
+    return float(chords(corners, at, at + 1, demands)[1].sum())
+
+
 def _total(way: States, demands: Demands) -> float:
     """Cost of straight lifts from corner to corner; infinite if one of them fails."""
     linked, cost = connect(way[:-1], way[1:], demands)
