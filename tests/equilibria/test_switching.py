@@ -5,6 +5,7 @@ import pytest
 from hypothesis import Phase, given, settings, strategies as st
 
 import equimorph as em
+from equimorph.equilibria.critical import normal_form
 from equimorph.errors import InputError
 from oracles.polynomial import Polynomial, fold_form, pitchfork_form, slaved, transcritical_form
 from typecheck import unchecked
@@ -102,3 +103,16 @@ def test_states_without_crossing_paths_are_refused():
         em.branches(isola, "a")
     with pytest.raises(InputError, match=r"`distance` must be positive and finite; got 0"):
         em.branches(pitchfork_form(1.0).state(0.0), "a", distance=0)
+
+
+def test_forms_of_events_have_the_same_bits_in_any_batch():
+    """The threads of a march share events among each other as they come."""
+    rod, rng = em.Rod(load="uniform"), np.random.default_rng(4)
+    p = np.array([1.0, 0.1, 1.5, 0.8]) + 0.1 * rng.uniform(-1.0, 1.0, (37, 4))
+    z = rod.natural(p)[0] + 0.1 * rod.sample(p, rng)
+    dp = np.broadcast_to([0.0, 0.0, 1.0, 0.0], p.shape)
+    together = normal_form(rod, z, p, dp)
+    alone = [normal_form(rod, z[k : k + 1], p[k : k + 1], dp[k : k + 1]) for k in range(len(z))]
+    for name in ("phi", "psi", "quadratic", "mixed", "path", "cubic"):
+        parts = np.concatenate([getattr(each, name) for each in alone])
+        np.testing.assert_array_equal(parts, getattr(together, name), name)

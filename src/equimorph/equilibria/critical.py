@@ -8,6 +8,7 @@ import numpy as np
 
 from equimorph.arrays import Float, Lanes, Parameters, Values
 from equimorph.equilibria.curves import AlongCurve, Curve, along_parameters
+from equimorph.linalg.dense import multiply
 from equimorph.structures import Equations, LinearSystem
 
 THIRD_STEP = 2e-3
@@ -81,7 +82,7 @@ class Critical:
         """Third derivative along v, the part of the unknowns that follow v², and their size."""
         structure, p, v = self.structure, self.p, self.v
         still = np.zeros_like(p)
-        norm = np.sqrt(v[:, : structure.unknowns] ** 2 @ structure.mass)
+        norm = np.sqrt(multiply(v[:, : structure.unknowns] ** 2, structure.mass))
         h = THIRD_STEP / norm
 
         def at(shift: float) -> Values:
@@ -201,7 +202,7 @@ def normal_form(structure: Equations, z: Lanes, p: Parameters, dp: Parameters) -
     """Coefficients at simple branch points of paths along `dp`; F_zzz by differences, to 1e-10."""
     n, still = structure.unknowns, np.zeros_like(p)
     b = null_border(structure, z, p)
-    norm = np.sqrt(b[:, :n] ** 2 @ structure.mass)
+    norm = np.sqrt(multiply(b[:, :n] ** 2, structure.mass))
     # with b·v = 1 a border b·|b|_M makes v = φ of unit length in the metric
     at = Critical(structure, z, p, np.ascontiguousarray(b * norm[:, None]))
     phi = at.v

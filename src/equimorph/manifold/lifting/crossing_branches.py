@@ -17,6 +17,7 @@ from equimorph.equilibria.critical import null_border
 from equimorph.equilibria.steps import Front, step_along
 from equimorph.equilibria.trace import trace
 from equimorph.equilibria.trace_options import EventCode
+from equimorph.linalg.dense import multiply
 from equimorph.manifold.complex.marked_complex import TRIANGLES
 from equimorph.manifold.geometry.crossings import reduction
 from equimorph.manifold.geometry.points import VertexKind
@@ -263,5 +264,5 @@ def _tangents(
     dt = (four[:, :, 1] / length[:, None]).ravel()
     weight = np.repeat(line.weight, 4)
     n = structure.unknowns
-    norm = np.sqrt(dz[:, :n] ** 2 @ structure.mass + (weight * dt) ** 2)
+    norm = np.sqrt(multiply(dz[:, :n] ** 2, structure.mass) + (weight * dt) ** 2)
     return dz / norm[:, None], dt / norm

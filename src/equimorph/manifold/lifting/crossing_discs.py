@@ -14,6 +14,7 @@ from scipy.optimize import brentq
 from equimorph.arrays import Float, ItemValues
 from equimorph.equilibria.critical import Critical, null_border
 from equimorph.equilibria.settle import lower_index
+from equimorph.linalg.dense import multiply
 from equimorph.manifold.geometry.exact_points import Aim, Pinned, correct_points, pin_crossings
 from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.setting import embed
@@ -253,6 +254,6 @@ def _coefficients(
     """
     structure, n = pairing.setting.structure, pairing.setting.structure.unknowns
     v = Critical(structure, z, p, np.tile(sense, (len(z), 1))).v
-    norm = np.sqrt(v[:, :n] ** 2 @ structure.mass) / (v**2).sum(axis=1)
+    norm = np.sqrt(multiply(v[:, :n] ** 2, structure.mass)) / (v**2).sum(axis=1)
     at = Critical(structure, z, p, np.ascontiguousarray(v * norm[:, None]))
     return at.quadratic, at.cubic

@@ -11,6 +11,7 @@ import numpy as np
 
 from equimorph.arrays import Int, Items, Lanes, Parameters, Place
 from equimorph.equilibria.critical import null_border
+from equimorph.linalg.dense import multiply
 from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.lifting.cells import CellFinder, Cells, Close
 from equimorph.manifold.lifting.crossing_branches import (
@@ -72,7 +73,7 @@ def _enter(pairing: Pairing, edge: Items, z: Lanes, p: Parameters) -> bool:
     setting, store = pairing.setting, pairing.points
     structure, n = setting.structure, setting.structure.unknowns
     phi = null_border(structure, z, p)
-    phi /= np.sqrt(phi[:, :n] ** 2 @ structure.mass)[:, None]
+    phi /= np.sqrt(multiply(phi[:, :n] ** 2, structure.mass))[:, None]
     owner, sense = np.divmod(np.arange(HALVES * len(z)), HALVES)
     line = edge_lines(pairing, edge).take(owner)
     tangents = np.where(sense, -1.0, 1.0)[:, None] * phi[owner], np.zeros(len(owner))

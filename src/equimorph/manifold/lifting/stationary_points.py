@@ -15,6 +15,7 @@ import numpy as np
 from equimorph.arrays import Flags, Float, Int, Lanes, Places, Some, Values
 from equimorph.columns import Columns
 from equimorph.equilibria.critical import null_border
+from equimorph.linalg.dense import multiply
 from equimorph.linalg.lanes import over_lanes
 from equimorph.manifold.geometry.crossings import Reduction, reduction
 from equimorph.manifold.geometry.points import Points
@@ -170,7 +171,7 @@ def _newton_step(
     bend, mixed = hessian[:, 0, 0], hessian[:, 0, 1:]
     level = known.value - 0.5 * gradient[:, 0] ** 2 / bend
     null = known.along_z[:, 0, : len(mass)]
-    factor = -8.0 * (null**2 @ mass) / bend
+    factor = -8.0 * (multiply(null**2, mass)) / bend
     slope = factor[:, None] * (gradient[:, 1:] - mixed * (gradient[:, 0] / bend)[:, None])
     curvature = hessian[:, 1:, 1:] - mixed[:, :, None] * mixed[:, None] / bend[:, None, None]
     values, vectors = np.linalg.eigh(np.nan_to_num(factor[:, None, None] * curvature))

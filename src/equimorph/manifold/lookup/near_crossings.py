@@ -34,6 +34,7 @@ from equimorph.equilibria.critical import Critical, null_border
 from equimorph.equilibria.hidden_events import multiplicity
 from equimorph.equilibria.newton_step import Planes
 from equimorph.equilibria.settle import Guards, Settled, lower_index, settle
+from equimorph.linalg.dense import multiply
 from equimorph.manifold.geometry.exact_points import Aim, Pinned, correct_points
 from equimorph.manifold.geometry.setting import Setting, embed
 from equimorph.manifold.geometry.simplices import shares_in
@@ -182,7 +183,7 @@ class NearCrossings:
         structure = self.setting.structure
         b = null_border(structure, z, own)
         v = Critical(structure, z, own, b).v
-        size = np.sqrt(v[:, : structure.unknowns] ** 2 @ structure.mass)
+        size = np.sqrt(multiply(v[:, : structure.unknowns] ** 2, structure.mass))
         r = np.einsum("li,li->l", v, structure.residual(z, own))
         r[np.abs(r) <= ROUND_OFF] = 0.0
         return Centres(z, own, b, size, r, lower_index(self.setting.structure, z, own), at)

@@ -14,6 +14,7 @@ from equimorph.equilibria.critical import Critical, null_border
 from equimorph.equilibria.critical_tests import bound, branching, gap, grazing, quadratic
 from equimorph.equilibria.trace_options import EventCode, EventKind
 from equimorph.errors import InputError
+from equimorph.linalg.dense import multiply
 from equimorph.model import Constraint, Grid, Progress, Workers, position
 from equimorph.structures import Structure
 from equimorph.tasks.maps.actuator_map import ActuatorMap, natural_states_over, survey
@@ -224,7 +225,7 @@ class LimitLoadRays(Paths):
         at = Critical(structure, z, p, null_border(structure, z, p))
         n = structure.unknowns
         v = np.zeros((len(vertices.kind), n))
-        v[folds] = at.v[:, :n] / np.sqrt(at.v[:, :n] ** 2 @ structure.mass)[:, None]
+        v[folds] = at.v[:, :n] / np.sqrt(multiply(at.v[:, :n] ** 2, structure.mass))[:, None]
         slope = np.zeros(len(v))
         slope[folds] = branching(structure, structure.parameters[self.load].name)(at)
         a, b = edges.T

@@ -12,6 +12,7 @@ from equimorph.argument_kinds import ANYTHING, short
 from equimorph.arrays import Flags, Float, Int
 from equimorph.equilibria import settle
 from equimorph.errors import InputError, suggestion
+from equimorph.linalg.dense import multiply
 from equimorph.model import Constraint, Descriptor, Rates, Schedule, names_of
 from equimorph.structures import States, Structure, stability_margin
 
@@ -343,7 +344,7 @@ def _cost(term: Term, first: Places, second: Places) -> Values:
         return np.asarray(np.sqrt(travel))
     n = structure.unknowns
     dz = second.states.z[:, :n] - first.states.z[:, :n]
-    return np.asarray(np.sqrt(dz**2 @ structure.mass + travel))
+    return np.asarray(np.sqrt(multiply(dz**2, structure.mass) + travel))
 
 
 def _times(rates: Rates, names: Sequence[str], dp: Float[np.ndarray, "pairs params"]) -> Values:
