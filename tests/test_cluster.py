@@ -163,13 +163,15 @@ def test_a_set_in_tiles_is_the_same_when_a_worker_is_killed_at_any_time(client):
     began = time.perf_counter()
     em.equilibrium_set(arch, box, workers=workers, **given)
     took = time.perf_counter() - began
-    for share in rng.uniform(0.05, 0.8, 5):
-        process = rng.choice(processes_of(client))
-        killer = threading.Timer(share * took, os.kill, (int(process), signal.SIGKILL))
-        killer.start()
-        assert_equal(em.equilibrium_set(arch, box, workers=workers, **given), alone)
-        killer.join()
-        client.wait_for_workers(2, timeout=60)
+    for share in rng.uniform(0.05, 0.8, 5):  # a process killed twice may have no successor
+        with processes(2) as fresh:
+            workers = cluster.dask(fresh)
+            assert_twice(workers.map(twice, BATCHES))
+            process = rng.choice(processes_of(fresh))
+            killer = threading.Timer(share * took, os.kill, (int(process), signal.SIGKILL))
+            killer.start()
+            assert_equal(em.equilibrium_set(arch, box, workers=workers, **given), alone)
+            killer.join()
 
 
 @pytest.mark.slow

@@ -208,7 +208,9 @@ def _take_over(numbers: Items, corners: Triples, known: Triples, given: int) -> 
         numbers[corners[new]] = known[new]
 
 
-def _discs_in_whole(discs: Discs, numbers: Items, part: Part, kept: ItemFlags) -> Discs:
+def _discs_in_whole(
+    discs: Discs, numbers: Int[np.ndarray, " points"], part: Part, kept: ItemFlags
+) -> Discs:
     """Some discs of a tile in numbers of the whole."""
     triangles = part.tile.triangles
     return Discs(

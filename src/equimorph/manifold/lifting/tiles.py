@@ -92,8 +92,8 @@ class Part:
     """A tile, with the numbers in the whole of the points and curves that it is given."""
 
     tile: Tile
-    points: Items
-    curves: Items
+    points: Int[np.ndarray, " points"]
+    curves: Int[np.ndarray, " curves"]
 
 
 def parts_of(whole: Pairing, tiles: list[Tile]) -> list[Part]:
@@ -126,7 +126,7 @@ def _points_in(whole: Pairing, tile: Tile) -> Items:
     return np.flatnonzero(chosen)
 
 
-def _flags(own: Items, numbers: Int[np.ndarray, " n"]) -> Bool[np.ndarray, " n"]:
+def _flags(own: Items, numbers: Int[np.ndarray, " all"]) -> Bool[np.ndarray, " all"]:
     """Which numbers, −1 for none, are among some."""
     there = np.zeros(max(int(numbers.max(initial=0)), int(own.max(initial=0))) + 2, bool)
     there[own] = True
