@@ -6,7 +6,7 @@ further conditions by it, and structures their natural states.
 See docs/decisions.md, "One corrector".
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
 from typing import Protocol, runtime_checkable
@@ -74,12 +74,18 @@ class Limits:
     """Weight of squared multipliers in the length of steps."""
 
     def take(self, some: Numbers) -> "Limits":
-        """Limits of some of the lanes."""
+        """Limits of some of the lanes, without the guards that points must pass afterwards."""
         too_long, exempt = self.too_long, self.exempt
-        return replace(
-            self,
-            too_long=too_long[some] if isinstance(too_long, np.ndarray) else too_long,
-            exempt=None if exempt is None else exempt[some],
+        return Limits(
+            self.iterations,
+            self.longest,
+            too_long[some] if isinstance(too_long, np.ndarray) else too_long,
+            self.converged,
+            self.following,
+            self.contraction,
+            self.free,
+            None if exempt is None else exempt[some],
+            self.multipliers,
         )
 
     def too_long_of(self, lanes: int) -> Values:
