@@ -20,7 +20,7 @@ from equimorph.structures.rod import Rod
 def starts() -> States:
     """Natural states of the arch with their loads."""
     arch, generator = em.Rod(load="uniform"), np.random.default_rng(5)
-    p = np.zeros((200, 4))
+    p = np.zeros((400, 4))
     p[:, 0], p[:, 1] = generator.uniform(0.2, 2.5, len(p)), generator.uniform(-2.0, 2.0, len(p))
     p[:, 3] = np.sin(1.0)
     states, found = arch.natural_states(p)
@@ -58,6 +58,7 @@ THROUGH = {"through_folds": True, "through_branch_points": True}
         (40, (10.0, 2.5), {"record": False}),
         (40, (), THROUGH),
         (40, (20.0,), {**THROUGH, "largest_step": 0.1}),
+        (133, (10.0,), {"record": False}),
     ],
 )
 def test_compiled_loops_equal_the_general_ones(

@@ -98,21 +98,26 @@ def within_ends(hidden: Events) -> Events:
     return replace(hidden, found=hidden.found & (hidden.t >= 0.0) & (hidden.t <= 1.0))
 
 
-def inside_last_steps(curve: Curve, bracket: Bracket, options: TraceOptions) -> list[Events]:
+def inside_last_steps(
+    curve: Curve,
+    bracket: Bracket,
+    determinants: Float[np.ndarray, "3 lanes"],
+    options: TraceOptions,
+) -> list[Events]:
     """Events inside the last steps of lanes, which no later determinant shows.
 
-    The determinant at the middle of the step tells whether it has to be searched.
+    The determinant at the middle of the step tells whether it has to be searched. `determinants`:
+    those at both ends, and their power of two.
     """
     ends = bracket.before.index == bracket.after.index
     ends &= bracket.what & options.stops != 0
     if not (curve.folds_change_index and options.look_inside and ends.any()):
         return []
-    step = bracket.take(np.flatnonzero(ends))
-    here, old, new = curve.take(step.lanes), step.before, step.after
-    middle = hermite(step, np.full(len(step.lanes), 0.5))
-    places = ((old.z, old.t), middle, (new.z, new.t))
-    values = np.stack([determinant(here, *at) for at in places])
-    some = np.flatnonzero(may_vanish(in_units(values, values[0, :, 1])))
+    last = np.flatnonzero(ends)
+    step, (first, second, power) = bracket.take(last), determinants[:, last]
+    here, middle = curve.take(step.lanes), hermite(step, np.full(len(last), 0.5))
+    between = in_units(determinant(here, *middle), power)
+    some = np.flatnonzero(may_vanish(np.stack([first, between, second])))
     step, unknown = step.take(some), np.full(len(some), np.nan)
     start, stop = step.travelled, step.travelled + step.step
     span = Span(step.lanes, step.before, step.after, start, stop, unknown)

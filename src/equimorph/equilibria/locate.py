@@ -18,9 +18,22 @@ from equimorph.equilibria.curves import AlongCurve, Curve, along_parameters, dua
 from equimorph.equilibria.newton_step import Planes
 from equimorph.equilibria.point_conditions import Crossing
 from equimorph.equilibria.settle import Guards, Settled, settle
-from equimorph.equilibria.steps import Bracket, Front, Line, Workspace, compiled_steps, new_scalars
+from equimorph.equilibria.steps import (
+    IN_CACHE,
+    Bracket,
+    Front,
+    Line,
+    Workspace,
+    compiled_steps,
+    new_scalars,
+)
 from equimorph.linalg.simd import LANES
-from equimorph.marching import event_kernels as roots, kernels, tick_kernels as ticks
+from equimorph.marching import (
+    event_kernels as roots,
+    kernels,
+    search_kernels as searches,
+    tick_kernels as ticks,
+)
 from equimorph.model import Constraint
 from equimorph.structures import Advance
 from equimorph.structures.contract import CompiledSteps
@@ -201,9 +214,6 @@ def locate_critical(curve: Curve, bracket: Bracket) -> Located:
 
 Scalar = Callable[[Some, Front], Float[np.ndarray, " some"]]
 
-VALUE = 1e-13
-"""Value of the scalar over that at the ends of the step that counts as zero."""
-
 
 def root_inside(
     curve: Curve,
@@ -227,11 +237,13 @@ def root_inside(
         Those whose largest excess is the scalar; none of them, if it is dt/ds.
     """
     search = _Search(curve, bracket, ends, guess)
-    compiled = None if constraints is None else compiled_steps(curve, search.root.z, constraints)
+    compiled = None
+    if constraints is not None:
+        compiled = compiled_steps(curve, bracket.before.z, constraints)
     if compiled:
         search.run(*compiled)
-    while search.active:
-        search.round(scalar)
+    else:
+        search.run_by_rounds(scalar)
     return search.root
 
 
@@ -246,45 +258,49 @@ class _Search:
         self, curve: Curve, bracket: Bracket, ends: tuple[Values, Values], guess: Values
     ) -> None:
         lanes, (old, new) = len(guess), (bracket.before, bracket.after)
-        self.curve, self.active, rows = curve, lanes, max(lanes, LANES)
-        self._places = tuple(np.empty((rows, old.z.shape[1])) for _ in range(7))
-        given = (old.z, new.z, new.tangent_z, old.z, old.tangent_z)
-        for place, each in zip(self._places, given, strict=False):
-            place[:lanes] = each
-        self._scalars, self._ends = new_scalars(rows), np.zeros((roots.ENDS, rows))
-        self._scalars[1][kernels.LANE, :lanes] = np.arange(lanes)
-        for row_number, column in (
-            (roots.X1, bracket.step), (roots.F1, ends[1]), (roots.T1, new.t),
-            (roots.SLOPE1, new.tangent_t), (roots.X2, 0.0), (roots.F2, ends[0]),
-            (roots.T2, old.t), (roots.SLOPE2, old.tangent_t), (roots.T0, old.t),
-            (roots.SHARE, 1.0 - guess),
-            (roots.SMALL, VALUE * (np.abs(ends[0]) + np.abs(ends[1]))),
-        ):  # fmt: skip
-            self._ends[row_number, :lanes] = column
+        values = np.empty((8, lanes))
+        for row, each in enumerate(
+            (bracket.step, *ends, old.t, new.t, old.tangent_t, new.tangent_t, guess)
+        ):
+            values[row] = each
+        points = (old.z, old.tangent_z, new.z, new.tangent_z)
+        self._steps = (*(np.ascontiguousarray(each) for each in points), values)
+        self.curve, self._state = curve, np.zeros(3, np.int64)
         self.root = Located(old.z.copy(), np.empty(lanes), np.empty(lanes), np.zeros(lanes, bool))
-        mass = curve.metric.mass
-        roots.begin(curve.weight, mass, self._places, *self._scalars, self._ends, lanes)
-        self._here = curve
-        self._close()
+
+    def _make_room(self, most: int) -> None:
+        """Make room for so many lanes at a time."""
+        lanes, size = self.root.z.shape
+        rows = max(min(lanes, most), LANES)
+        self._places = tuple(np.empty((rows, size)) for _ in range(7))
+        self._scalars, self._ends = new_scalars(rows), np.empty((roots.ENDS, rows))
 
     def run(self, steps: CompiledSteps, line: Line) -> None:
         """All rounds in the structure's loop."""
+        self._make_room(IN_CACHE)
         (numbers, counts), root, rows = self._scalars, self.root, len(self._places[0])
         trial, row = self._places[5:]
-        space = Workspace(rows, line, len(steps.bounds))
-        state = np.array([ticks.STEP, self.active])
-        problem = (line, self.curve.metric.mass, steps.guard)
+        space, state = Workspace(rows, line, len(steps.bounds)), self._state
+        problem = (line, self.curve.weight, self.curve.metric.mass, steps.guard)
         block = (self._places, numbers, counts, self._ends, state)
         found = (root.z, root.t, root.step, root.found)
-        given = (problem, block, space.columns, space.scratch, np.empty(rows), found)
+        given = (problem, self._steps, block, space.columns, space.scratch, np.empty(rows), found)
         while steps.search(steps.tables, steps.bounds, *given) == ticks.UNSAFE:
             lanes = counts[kernels.LANE, : state[ticks.ACTIVE]]
             space.step_again(self.curve, trial, row, numbers, lanes, steps.guard)
-        self.active = 0
 
-    def round(self, scalar: Scalar) -> None:
+    def run_by_rounds(self, scalar: Scalar) -> None:
+        """All rounds by the methods of any structure."""
+        self._make_room(len(self.root.t))
+        around = (self.curve.weight, self.curve.metric.mass, self._steps)
+        searches.admit(*around, self._places, *self._scalars, self._ends, self._state)
+        self._close()
+        while self._state[ticks.ACTIVE] > 0:
+            self._round(scalar)
+
+    def _round(self, scalar: Scalar) -> None:
         """One Newton step of every lane, and all that follows from it."""
-        active, (numbers, counts) = self.active, self._scalars
+        active, (numbers, counts) = int(self._state[ticks.ACTIVE]), self._scalars
         trial, row = (place[:active] for place in self._places[5:])
         closing = numbers[kernels.CORNER, :active], numbers[kernels.DEFECT, :active]
         move = self._here.advance(trial, numbers[kernels.TRIAL, :active], row, *closing)
@@ -308,9 +324,9 @@ class _Search:
 
     def _close(self) -> None:
         """Write down what is finished and close the gaps."""
-        root, counts = self.root, self._scalars[1]
-        state = (self._places, counts, self._ends, self.active)
+        root, counts, active = self.root, self._scalars[1], int(self._state[ticks.ACTIVE])
+        state = (self._places, counts, self._ends, active)
         roots.hand_out(*state, root.z, root.t, root.step, root.found)
-        left = (self._places, *self._scalars, self._ends, self.active)
-        self.active = kernels.close_gaps(*left)
-        self._here = self.curve.take(counts[kernels.LANE, : self.active])
+        left = kernels.close_gaps(self._places, *self._scalars, self._ends, active)
+        self._state[ticks.ACTIVE] = left
+        self._here = self.curve.take(counts[kernels.LANE, :left])

@@ -14,7 +14,7 @@ from equimorph.equilibria.events import Events
 from equimorph.equilibria.locate import polish
 from equimorph.equilibria.rare_steps import RareSteps
 from equimorph.equilibria.rows import Rows
-from equimorph.equilibria.steps import Front, Line, Workspace, compiled_steps
+from equimorph.equilibria.steps import IN_CACHE, Front, Line, Workspace, compiled_steps
 from equimorph.equilibria.trace_options import TraceOptions
 from equimorph.errors import InputError
 from equimorph.marching import kernels, tick_kernels as ticks
@@ -27,8 +27,6 @@ AT_GOAL, FROM_GOAL = 1e-9, 1e-6
 lanes there whose steps became too small."""
 PATIENCE = 40
 """Reciprocal share of finished lanes at which the gaps that they leave in the block are closed."""
-IN_CACHE = 128
-"""Most lanes in a loop that is compiled as a whole: they stay in the cache of a processor."""
 WHY = {
     kernels.SHORT: "the step became too small",
     kernels.LONG: "no end in {most} steps",

@@ -27,6 +27,8 @@ from equimorph.structures import Advance
 from equimorph.structures.contract import CompiledSteps
 
 Forces = Float[np.ndarray, "forced size"]
+IN_CACHE = 128
+"""Most lanes in a loop that is compiled as a whole: they stay in the cache of a processor."""
 Line = tuple[Parameters, Parameters, Forces, Forces]
 
 
@@ -163,19 +165,19 @@ class EventFile:
     def __init__(self, size: int, room: int, state: Names) -> None:
         self._state = state
         ends = tuple(np.empty((room, size)) for _ in range(4))
-        self.buffer = (*ends, np.empty((6, room)), np.empty((4, room), np.int64))
+        self.buffer = (*ends, np.empty((9, room)), np.empty((4, room), np.int64))
 
     @property
     def count(self) -> int:
         """How many there are."""
         return int(self._state[tick_kernels.EVENTS])
 
-    def drain(self) -> Bracket:
-        """Hand out everything."""
+    def drain(self) -> tuple[Bracket, Float[np.ndarray, "3 some"]]:
+        """Hand out everything; determinants at both ends of the steps, and their power of two."""
         count, self._state[tick_kernels.EVENTS] = self.count, 0
         z0, tangent0, z1, tangent1 = (each[:count].copy() for each in self.buffer[:4])
         values, (lanes, what, before, after) = (each[:, :count].copy() for each in self.buffer[4:])
-        return Bracket(
+        bracket = Bracket(
             lanes,
             Front(z0, values[0], tangent0, values[1], before),
             Front(z1, values[2], tangent1, values[3], after),
@@ -183,6 +185,7 @@ class EventFile:
             values[5],
             what,
         )
+        return bracket, values[6:]
 
 
 class PointFile:

@@ -26,7 +26,7 @@ Names = Numbers
 
 LANES_PER_THREAD = 128
 """A second thread is not worth its start for fewer lanes than this on each."""
-EVENTS_AT_ONCE, OF_A_LANE = 512, 16
+EVENTS_AT_ONCE, OF_A_LANE = 768, 16
 """Most brackets of events that are located together, over all lanes and of one lane."""
 REPORT_EVERY = 0.2
 """Seconds."""
@@ -198,9 +198,10 @@ class _Job:
     def _locate(self) -> None:
         """Locate everything that is pending; settle lanes that ended, retry where it failed."""
         block, ledger = self.block, self.ledger
-        curve, bracket, options = block.curve, block.rows.events.drain(), block.options
+        curve, options = block.curve, block.options
+        bracket, determinants = block.rows.events.drain()
         shown = locate_all(curve, [bracket], block.constraints, options)
-        last = inside_last_steps(curve, bracket, options)
+        last = inside_last_steps(curve, bracket, determinants, options)
         hidden = [within_ends(each) for each in (*block.rare.hidden, *last)]
         events = Events.join([shown, *hidden], curve.metric.size)
         block.rare.hidden = []

@@ -12,7 +12,9 @@ from equimorph.marching.kernels import (
     CONVERGED,
     CORNER,
     CORRECTING,
+    COUNTS,
     DEFECT,
+    DET,
     ENDED,
     HEAD,
     INDEX,
@@ -22,9 +24,11 @@ from equimorph.marching.kernels import (
     LAST,
     LENGTH,
     LEVEL,
+    NEW_DET,
     NEW_INDEX,
     NEW_SLOPE,
     NORM,
+    NUMBERS,
     REFUSED,
     SLOPE,
     STAGE,
@@ -32,6 +36,7 @@ from equimorph.marching.kernels import (
     SUMS,
     TRAVELLED,
     TRIAL,
+    UNIT,
     WEIGHT,
     WHAT,
     T,
@@ -45,45 +50,69 @@ tangent per arclength, at the newest and the other end; length and scalar at the
 trial as a share of the way from the newest end to the other; scalar that counts as zero; t at the
 start of the step."""
 ENDS = 15
+(
+    STEP_LENGTH, AT_START, AT_END, T_START, T_END, SLOPE_START, SLOPE_END, GUESS,
+) = range(8)  # fmt: skip
+"""Values of steps that are searched: length; scalar, t and dt/ds at start and end; share of the
+step that is tried first."""
 
 TRIALS = 60
 PLACE = 1e-14
 """Width of a bracket that ends the iteration."""
-
-
-@njit(**SUMS)
-def begin(weight, mass, places, numbers, counts, ends, active):
-    """Prepare lanes whose ends are set: their closing equation, and the first trial."""
-    _, one, slope_one, two, slope_two, _, row = places
-    n = mass.shape[0]
-    for i in range(active):
-        numbers[WEIGHT, i] = weight[i] * weight[i]
-        numbers[CORNER, i] = numbers[WEIGHT, i] * ends[SLOPE2, i]
-        for j in range(n):
-            row[i, j] = mass[j] * slope_two[i, j]
-        for j in range(n, row.shape[1]):
-            row[i, j] = 0.0
-        corner = numbers[CORNER, i]
-        rate = 0.0
-        for j in range(n):
-            rate += row[i, j] * slope_one[i, j]
-        ends[RATE1, i], ends[RATE2, i] = rate + corner * ends[SLOPE1, i], 1.0
-        ends[X3, i], ends[F3, i] = ends[X2, i], ends[F2, i]
-        if ends[F2, i] == 0.0:
-            _copy(i, one, two)
-            _copy(i, slope_one, slope_two)
-            for a, b in ((X1, X2), (F1, F2), (T1, T2), (SLOPE1, SLOPE2)):
-                ends[a, i] = ends[b, i]
-        if abs(ends[F1, i]) > ends[SMALL, i]:
-            _propose(i, mass, places, numbers, counts, ends)
-        else:
-            counts[STAGE, i] = ENDED
+VALUE = 1e-13
+"""Value of the scalar over that at the ends of the step that counts as zero."""
 
 
 @njit(**INLINE)
-def _copy(i, target, source):
+def begin(i, lane, weight, mass, steps, places, numbers, counts, ends):
+    """Let the search in step `lane` begin in row i: its closing equation, and the first trial.
+
+    `steps`: points and tangents at both ends, and values, named below, of all steps.
+    """
+    z0, tangent0, z1, tangent1, values = steps
+    start, one, slope_one, two, slope_two, _, row = places
+    n = mass.shape[0]
+    for k in range(NUMBERS):
+        numbers[k, i] = 0.0
+    for k in range(COUNTS):
+        counts[k, i] = 0
+    counts[LANE, i] = lane
+    ends[X1, i], ends[X2, i] = values[STEP_LENGTH, lane], 0.0
+    ends[F1, i], ends[F2, i] = values[AT_END, lane], values[AT_START, lane]
+    ends[T1, i], ends[T2, i] = values[T_END, lane], values[T_START, lane]
+    ends[SLOPE1, i], ends[SLOPE2, i] = values[SLOPE_END, lane], values[SLOPE_START, lane]
+    ends[T0, i], ends[SHARE, i] = ends[T2, i], 1.0 - values[GUESS, lane]
+    ends[SMALL, i] = VALUE * (abs(ends[F1, i]) + abs(ends[F2, i]))
+    for j in range(row.shape[1]):
+        start[i, j], two[i, j], slope_two[i, j] = z0[lane, j], z0[lane, j], tangent0[lane, j]
+    numbers[WEIGHT, i] = weight[lane] * weight[lane]
+    numbers[CORNER, i] = numbers[WEIGHT, i] * ends[SLOPE2, i]
+    for j in range(n):
+        row[i, j] = mass[j] * slope_two[i, j]
+    for j in range(n, row.shape[1]):
+        row[i, j] = 0.0
+    rate = 0.0
+    for j in range(n):
+        rate += row[i, j] * tangent1[lane, j]
+    ends[RATE1, i], ends[RATE2, i] = rate + numbers[CORNER, i] * ends[SLOPE1, i], 1.0
+    ends[X3, i], ends[F3, i] = ends[X2, i], ends[F2, i]
+    if ends[F2, i] == 0.0:
+        for a, b in ((X1, X2), (F1, F2), (T1, T2), (SLOPE1, SLOPE2)):
+            ends[a, i] = ends[b, i]
+        _copy_row(i, one, lane, z0)
+        _copy_row(i, slope_one, lane, tangent0)
+    else:
+        _copy_row(i, one, lane, z1)
+        _copy_row(i, slope_one, lane, tangent1)
+    _propose(i, mass, places, numbers, counts, ends)
+    if not abs(ends[F1, i]) > ends[SMALL, i]:
+        counts[STAGE, i] = ENDED
+
+
+@njit(**INLINE)
+def _copy_row(i, target, k, source):
     for j in range(source.shape[1]):
-        target[i, j] = source[i, j]
+        target[i, j] = source[k, j]
 
 
 @njit(**INLINE)
@@ -135,11 +164,11 @@ def _replace_end(i, value, new_tangent, places, numbers, ends):
     third = (X1, F1) if same else (X2, F2)
     ends[X3, i], ends[F3, i] = ends[third[0], i], ends[third[1], i]
     if not same:
-        _copy(i, two, one)
-        _copy(i, slope_two, slope_one)
+        _copy_row(i, two, i, one)
+        _copy_row(i, slope_two, i, slope_one)
         for k in range(5):
             ends[X2 + k, i] = ends[X1 + k, i]
-    _copy(i, one, trial)
+    _copy_row(i, one, i, trial)
     norm = 1.0 / numbers[NORM, i]
     for j in range(trial.shape[1]):
         slope_one[i, j] = new_tangent[i, j] * norm
@@ -195,6 +224,8 @@ def file_events(new_tangent, stops, places, numbers, counts, active, buffer, fil
         values[0, filled], values[1, filled] = numbers[T, i], numbers[SLOPE, i]
         values[2, filled], values[3, filled] = numbers[TRIAL, i], numbers[NEW_SLOPE, i]
         values[4, filled], values[5, filled] = numbers[LENGTH, i], numbers[TRAVELLED, i]
+        values[6, filled], values[7, filled] = numbers[DET, i], numbers[NEW_DET, i]
+        values[8, filled] = numbers[UNIT, i]
         names[0, filled], names[1, filled] = counts[LANE, i], what
         names[2, filled], names[3, filled] = counts[INDEX, i], counts[NEW_INDEX, i]
         filled += 1

@@ -1,14 +1,15 @@
 """The search for roots inside steps as one loop that structures make theirs; see `tick_kernels`."""
 
-from equimorph.linalg.compiled import template
+from equimorph.linalg.compiled import njit, template
 from equimorph.linalg.kernels import FLAGS
 from equimorph.linalg.simd import LANES
-from equimorph.marching.event_kernels import hand_out, shrink
+from equimorph.marching.event_kernels import begin, hand_out, shrink
 from equimorph.marching.kernels import (
     CORNER,
     DEFECT,
     EXACT,
     NEW_SLOPE,
+    SUMS,
     close_gaps,
     correct,
 )
@@ -19,10 +20,20 @@ from equimorph.marching.tick_kernels import (
     PHASE,
     STEP,
     UNSAFE,
+    WAITING,
     any_below,
     gather,
     lay_out,
 )
+
+
+@njit(**{**SUMS, "_nrt": True})
+def admit(weight, mass, steps, places, numbers, counts, ends, state):
+    """Let searches that wait begin in the free rows."""
+    while state[ACTIVE] < places[0].shape[0] and state[WAITING] < weight.shape[0]:
+        i, lane = state[ACTIVE], state[WAITING]
+        begin(i, lane, weight, mass, steps, places, numbers, counts, ends)
+        state[ACTIVE], state[WAITING] = i + 1, lane + 1
 
 
 def search_of(step, excess):
@@ -46,17 +57,20 @@ def search_of(step, excess):
                     values[at[i]] = max(values[at[i]], found[k, i])
 
     @template(**FLAGS)
-    def search(work, tables, bounds, problem, block, move, scratch, values, root):
+    def search(work, tables, bounds, problem, steps, block, move, scratch, values, root):
         """Search until every lane is finished, or the structure has to take a step itself."""
-        line, mass, guard = problem
+        line, weight, mass, guard = problem
         places, numbers, counts, ends, state = block
         dz, dt, tangent, slope, residual, index, determinant, ratio = move
         trial, row = places[5], places[6]
         z, t, at, found = root
         p, dp, force, growth = scratch[0], scratch[1], scratch[6], scratch[7]
-        while state[ACTIVE] > 0:
-            active = state[ACTIVE]
+        while True:
             if state[PHASE] == STEP:
+                admit(weight, mass, steps, places, numbers, counts, ends, state)
+                active = state[ACTIVE]
+                if active == 0:
+                    return IDLE
                 lay_out(line, trial, row, numbers, counts, active, scratch)
                 n = max(active, LANES)
                 step(
@@ -67,12 +81,12 @@ def search_of(step, excess):
                 state[PHASE] = CORRECT
                 if any_below(ratio, active, guard):
                     return UNSAFE
+            active = state[ACTIVE]
             correct(dz, dt, tangent, slope, mass, trial, numbers, counts, active, EXACT, 0.0)
             measure(work, tables, bounds, line, block, scratch, values)
             shrink(values, tangent, mass, places, numbers, counts, ends, active)
             hand_out(places, counts, ends, active, z, t, at, found)
             state[ACTIVE] = close_gaps(places, numbers, counts, ends, active)
             state[PHASE] = STEP
-        return IDLE
 
     return search

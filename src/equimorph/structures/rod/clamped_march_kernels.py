@@ -63,10 +63,10 @@ def march_lanes(tables, bounds, problem, queue, block, move, files, scratch, rul
 
 
 @njit(**FLAGS)
-def search_lanes(tables, bounds, problem, block, move, scratch, values, root):
+def search_lanes(tables, bounds, problem, steps, block, move, scratch, values, root):
     """Find roots on straight lines; see `marching.search_kernels.search_of`."""
     work = _work(tables, block[0][5].shape[0])
-    return _search(work, tables, bounds, problem, block, move, scratch, values, root)
+    return _search(work, tables, bounds, problem, steps, block, move, scratch, values, root)
 
 
 @njit(**FLAGS)
