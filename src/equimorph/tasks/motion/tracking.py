@@ -55,7 +55,9 @@ class Tracking:
     margin
         Smallest stability margin on the way.
     schedule
-        Parameters along the whole motion; None if it was refused.
+        Parameters along the whole motion; None if it was refused. The motion is judged on its
+        curve; `verify` checks that straight lines between the rows keep it stable, too, which they
+        need not beside a fold.
     compromise
         Beyond the failure, if requested: the stable states with the least half sum of squared
         misses of the targets.
