@@ -34,6 +34,8 @@ from equimorph.linalg.simd import (
 
 # Plain integers: for a literal argument the compiler would make another copy of a kernel.
 TILE, TIES, GROUP = np.int64(8), np.int64(2), np.int64(2)
+USUAL = np.int64(8)
+"""Inner nodes of an element of the usual degree: loops of known lengths are unrolled."""
 
 
 @njit(**INNER)
@@ -58,7 +60,16 @@ def _factor_group(stiffness, group, diagonal, lower):
 
     Below the diagonal L, above it D·Lᵀ, on it the reciprocal pivots.
     """
-    elements, inner = stiffness.shape[0], stiffness.shape[1] - 2
+    inner = stiffness.shape[1] - 2
+    if inner == USUAL:
+        _factor_inner(stiffness, group, diagonal, lower, USUAL)
+    else:
+        _factor_inner(stiffness, group, diagonal, lower, inner)
+
+
+@njit(**{**INNER, "forceinline": True})
+def _factor_inner(stiffness, group, diagonal, lower, inner):
+    elements = stiffness.shape[0]
     base, e = group * inner * inner * GROUP, group * GROUP
     other = min(e + 1, elements - 1)  # a spare member repeats the last element
     inverse = stack2(spread(1.0), spread(1.0))
