@@ -54,18 +54,8 @@ CHUNK = 512
 """Points that are served together: their work arrays stay small."""
 
 Guesses = Float[np.ndarray, "hits size"]
-
-
-@dataclass(frozen=True)
-class _Chunk:
-    """States over some points."""
-
-    found: Found
-    """The certain ones."""
-    doubtful: Hits | None
-    """Cells near undecided points, if there are any."""
-    hidden: Found | None
-    """States beside cusps, if there are any."""
+Chunk = tuple[Found, Hits | None, Found | None]
+"""Certain states over some points, cells near undecided ones, and states beside cusps."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,14 +130,12 @@ class Sheets:
         constraints included, or a cell gives no state, all known equilibria nearby are lifted to
         the point instead.
         """
-        chunks = self._in_chunks(p)
-        parts = [chunk.found for chunk in chunks]
-        doubtful = [chunk.doubtful for chunk in chunks if chunk.doubtful is not None]
-        if doubtful:
+        certain, near, hidden = zip(*self._in_chunks(p), strict=True)
+        parts = list(certain)
+        if doubtful := [each for each in near if each is not None]:
             parts.extend(self._search(p, Hits.concatenate(doubtful)))
-        hidden = [chunk.hidden for chunk in chunks if chunk.hidden is not None]
-        if hidden:
-            parts = united(self.structure, parts, hidden)
+        if beside := [each for each in hidden if each is not None]:
+            parts = united(self.structure, parts, beside)
         z, point, cell = parts[0] if len(parts) == 1 else in_order(parts)
         if self.crossings is not None:
             z, point, cell = self._beside_crossings(self.crossings, p, z, point, cell)
@@ -219,16 +207,15 @@ class Sheets:
         order = np.lexsort((cell, point))
         return z[order], point[order], cell[order]
 
-    def _in_chunks(self, p: Points) -> list["_Chunk"]:
-        """States and undecided cells as `_some` finds them, chunk by chunk, on all threads."""
-        if len(p) <= CHUNK:
-            return [self._some(p, 0)]
-        starts = range(0, len(p), CHUNK)
-        out: dict[int, _Chunk] = {}
+    def _in_chunks(self, p: Points) -> list[Chunk]:
+        """States over points, chunk by chunk, on all threads."""
+        starts = range(0, max(len(p), 1), CHUNK)
+        out: dict[int, Chunk] = {}
 
         def serve(own: range) -> None:
             for at in own:
-                out[at] = self._some(p[at : at + CHUNK], at)
+                some = p[at : at + CHUNK]
+                out[at] = *self._some(some, at), self._beside_cusps(some, at)
 
         number = min(threads(), len(starts))
         if number < 2:
@@ -238,14 +225,13 @@ class Sheets:
                 task.result()
         return [out[at] for at in starts]
 
-    def _some(self, p: Points, first: int) -> "_Chunk":
-        """States over some points; `first` is added to the numbers of these."""
+    def _some(self, p: Points, first: int) -> tuple[Found, Hits | None]:
+        """Certain states over points, and the cells near undecided ones; `first` is added."""
         near = self._near(p[:, self.free])
         of_hits = near.cell, near.weights
         tried = worth_trying(of_hits, near.inside, self._brims, self.above.maps, NUDGE)
         if len(tried) == 0:
-            nothing = np.zeros((0, self.points.z.shape[1])), tried, tried
-            return _Chunk(nothing, None, self._beside_cusps(p, first))
+            return (np.zeros((0, self.points.z.shape[1])), tried, tried), None
         hits = near.take(tried)
         at, guess = p[hits.point], self._guess(hits)
         wanted, room = self.cell_index[hits.cell], self._room[hits.cell]
@@ -263,8 +249,7 @@ class Sheets:
             doubtful = near.take(~sure[near.point])
             doubtful = replace(doubtful, point=first + doubtful.point)
         kept = found[are_feasible(self.constraints, z[found], at[found])]
-        certain = z[kept], first + hits.point[kept], hits.cell[kept]
-        return _Chunk(certain, doubtful, self._beside_cusps(p, first))
+        return (z[kept], first + hits.point[kept], hits.cell[kept]), doubtful
 
     def _near(self, x: Float[np.ndarray, "points d"]) -> Hits:
         """Cells near points, including those at the rims whose bands contain the points."""
