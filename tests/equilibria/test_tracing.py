@@ -12,7 +12,6 @@ from equimorph.equilibria.settle import settle
 from equimorph.equilibria.steps import Bracket, Front, _unit, step_along
 from equimorph.equilibria.trace import Batching
 from equimorph.equilibria.trace_options import EventCode
-from equimorph.marching import kernels, step_kernels
 from equimorph.structures import States
 from oracles.polynomial import Polynomial, fold_form, pitchfork_form
 
@@ -245,21 +244,3 @@ def test_branch_points_exist_or_not_in_any_unit_of_energy(scale, offset):
     assert found.found.tolist() == [offset == 0.0]
     if offset == 0.0:
         assert abs(found.t[0] - 0.5) < 1e-9
-
-
-@pytest.mark.parametrize(("length", "distance", "width"), [(1, 2, 0.05), (1, 1, 0.01), (0.1, 1, 1)])
-def test_steps_towards_a_rounded_corner_are_as_long_as_the_turning_allows(length, distance, width):
-    """Curvature w/(s₀ − s)², which turns by w l/(d (d − l)) over a length l at the distance d.
-
-    Tolerance: the bend of a step is a mean, which is taken for that at its middle: 15 %, for steps
-    no longer than the distance.
-    """
-    numbers = np.zeros((kernels.NUMBERS, 1))
-    numbers[kernels.TURNING], numbers[kernels.ARC] = 0.25, length
-    before, bend = (width / (d * (d + length)) for d in (distance + length, distance))
-    numbers[kernels.BEND] = before
-    step = step_kernels._before_bends.py_func(0, 100.0, length, bend, numbers)
-    exact = 0.25 * distance**2 / (width + 0.25 * distance)
-    assert step == pytest.approx(exact, rel=0.15)
-    flatter = step_kernels._before_bends.py_func(0, 100.0, length, 0.5 * before, numbers)
-    assert flatter == 100.0

@@ -129,18 +129,17 @@ def _take_over(i, new_tangent, places, numbers, counts):
 def _before_bends(i, length, arc, bend, numbers):
     """Shorten a step that would turn too far if the curvature of the path grows on as it did.
 
-    Before a fold paths turn as around a rounded corner: one over the root of the curvature falls
-    linearly along them. Steps that go too far are the dearest.
+    Towards a fold it grows within few steps, and those that go too far are the dearest.
     """
-    old, turning = numbers[BEND, i], numbers[TURNING, i]
+    old = numbers[BEND, i]
     if not (bend > old > 0.0):
         return length
-    middle = 1.0 / np.sqrt(bend)
-    fall = (1.0 / np.sqrt(old) - middle) / (0.5 * (arc + numbers[ARC, i]))
-    fall = min(fall, middle / arc)
-    end = middle - 0.5 * arc * fall
-    # the path turns by l / (end (end - fall l)) over a length l
-    return min(length, turning * end * end / (1.0 + turning * end * fall))
+    trend = np.log(bend / old) / (arc + numbers[ARC, i])
+    for _ in range(8):
+        if length * bend * np.exp(trend * (length + arc)) <= numbers[TURNING, i]:
+            break
+        length *= 0.8
+    return length
 
 
 @njit(**INLINE)
