@@ -25,6 +25,7 @@ from equimorph.manifold.geometry.points import on_fold
 from equimorph.manifold.geometry.topology import flags_of, pieces
 from equimorph.model import Box
 from equimorph.structures import States
+from equimorph.structures.metric import metric_length
 
 ASIDE = 1e-7
 """Distance across an edge, in ranges of the parameters, at which the other side is examined."""
@@ -145,7 +146,7 @@ def _across(
     own = eset.points[used]
     z, p = np.full(own.z.shape, np.nan), np.full(own.p.shape, np.nan)
     z[there.point], p[there.point] = there.states.z, there.states.p
-    gap = np.sqrt((z - own.z)[:, : structure.unknowns] ** 2 @ structure.mass)
+    gap = metric_length(structure, z - own.z)
     return z, p, np.where(np.isfinite(gap), gap, np.inf)
 
 

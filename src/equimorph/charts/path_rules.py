@@ -43,6 +43,7 @@ from equimorph.model import (
     remember_call,
 )
 from equimorph.structures import Structure
+from equimorph.structures.metric import metric_length
 
 INTERVALS = 24
 """Intervals of the grid over which natural states are known."""
@@ -295,7 +296,7 @@ class _OnPath(Rule):
         """Prefer the ends of paths."""
         start = Unloaded.of(eset, self.parameter)
         ends = self.ends(eset, start)
-        setting, n = eset.setting, eset.structure.unknowns
+        setting = eset.setting
 
         def over(points: Points) -> Lanes:
             p = np.tile(setting.base, (len(points), 1))
@@ -308,8 +309,7 @@ class _OnPath(Rule):
 
         def choose(found: Found, points: Points) -> Bool[np.ndarray, " found"]:
             asked, back = np.unique(points[found.point], axis=0, return_inverse=True)
-            gap = (found.states.z - over(asked)[back])[:, :n]
-            distance = np.sqrt(gap**2 @ eset.structure.mass)
+            distance = metric_length(eset.structure, found.states.z - over(asked)[back])
             near = distance < MATCH  # not a number where the path ends elsewhere
             score = np.where(near, distance, np.inf)
             return first_of_each(found, score, eset.structure.elevation)

@@ -22,6 +22,7 @@ from equimorph.equilibria.trace_options import EventCode
 from equimorph.manifold.lookup.exact_states import exact_states
 from equimorph.model import Constraint
 from equimorph.structures import States, Structure, join_states
+from equimorph.structures.metric import metric_length
 
 DIFFERENT = 1e-4
 """Distance in the metric from which on two states over a point are different ones."""
@@ -88,11 +89,10 @@ class Preference:
         A rule without a score names one state, whatever others there are: they are left out.
         """
         structure = self.cells.eset.structure
-        points, n = self.cells.coordinates(z, p), structure.unknowns
+        points = self.cells.coordinates(z, p)
         if found is None:
             found = self.cells.find(points if self.choice.score is not None else points[:0])
-        gap = (found.states.z - z[found.point])[:, :n] ** 2 @ structure.mass
-        own = np.sqrt(gap) < DIFFERENT
+        own = metric_length(structure, found.states.z - z[found.point]) < DIFFERENT
         # the state itself takes part as it is: at a fold no search would find it
         cell = np.full(len(z), -1)
         cell[found.point[own]] = found.cell[own]

@@ -44,6 +44,7 @@ from equimorph.manifold.geometry.topology import keys_of
 from equimorph.manifold.queries.levels import part_of
 from equimorph.model import Constraint, Descriptor
 from equimorph.structures import States
+from equimorph.structures.metric import metric_length
 from equimorph.tables import html_table
 from equimorph.tolerances import IN_BOX
 
@@ -276,10 +277,10 @@ def _signs(preference: Preference) -> Float[np.ndarray, " V"]:
     fold, other = _neighbours_off_folds(corners, doubtful, folded)
     points = preference.cells.values
     there = preference.over((1.0 - BESIDE) * points[fold] + BESIDE * points[other])
-    n, mass = eset.structure.unknowns, eset.structure.mass
-    z = eset.points.z[:, :n]
-    far = (there.states.z[:, :n] - z[fold[there.point]]) ** 2 @ mass
-    own = far < MOVED**2 * ((z[other[there.point]] - z[fold[there.point]]) ** 2 @ mass)
+    z, structure = eset.points.z, eset.structure
+    far = metric_length(structure, there.states.z - z[fold[there.point]])
+    side = metric_length(structure, z[other[there.point]] - z[fold[there.point]])
+    own = far < MOVED * side
     values[fold[there.point[own]]] = -1.0
     return values
 

@@ -16,6 +16,7 @@ from equimorph.manifold.complex.kept_tables import from_cache, places_of
 from equimorph.manifold.geometry.setting import embed
 from equimorph.model import Descriptor, Rebuilt, remember_call
 from equimorph.structures import State, States
+from equimorph.structures.metric import metric_length
 from equimorph.tolerances import SAME_TO_ROUNDING
 
 Scores = Float[np.ndarray, " found"]
@@ -150,10 +151,9 @@ def nearest(to: State | int) -> Rule:
         When the rule is used, if the set has no such stratum.
     """
     if isinstance(to, State):
-        n, mass, u = to.structure.unknowns, to.structure.mass, to.z[: to.structure.unknowns]
         return _Least(
             "nearest to a state",
-            lambda _: lambda found: np.asarray((found.states.z[:, :n] - u) ** 2 @ mass),
+            lambda _: lambda found: metric_length(to.structure, found.states.z - to.z),
         )
     identity: Identity = {"rule": "nearest", "of": to}
     return _Least(f"nearest to stratum {to}", lambda eset: _distance_from(eset, to), identity)

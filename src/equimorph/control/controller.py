@@ -15,6 +15,7 @@ from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Constraint, Descriptor
 from equimorph.structures import State, States
+from equimorph.structures.metric import metric_length
 from equimorph.tasks.motion.tracking import Tracking
 from equimorph.tasks.planning.network import Demands
 from equimorph.tasks.route import Route
@@ -300,8 +301,8 @@ class Controller:
         loads = states.p[:, self._loads]
         z, p = (each[None].repeat(len(states), 0) for each in (self._goal.z, self._goal.p))
         there, arrived = move_states(States(self.structure, z, p), self._loads, loads)
-        gap = (there.z - states.z)[:, : self.structure.unknowns]
-        return np.asarray(arrived & (gap**2 @ self.structure.mass < SAME_STATE**2))
+        gap = metric_length(self.structure, there.z - states.z)
+        return np.asarray(arrived & (gap < SAME_STATE))
 
     def _replan(self, belief: Belief, likely: LikelyLoads, place: Bundles) -> Belief:
         """Another route over the set, safe under all likely loads."""

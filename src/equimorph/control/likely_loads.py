@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from equimorph.arrays import Flags, Float, Int, Parameters, Some, Values
-from equimorph.equilibria.soft_modes import metric_length
 from equimorph.manifold.geometry.topology import runs
 from equimorph.model import position
 from equimorph.structures import States, Structure, join_states
+from equimorph.structures.metric import metric_length
 from equimorph.tasks.planning.network import MATCH, Demands, lift_straight
 from equimorph.tolerances import SAME_TO_ROUNDING
 

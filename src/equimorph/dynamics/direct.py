@@ -15,6 +15,7 @@ from equimorph.dynamics.writer import document
 from equimorph.errors import InputError
 from equimorph.structures import SpatialRod, State, States, Structure, Truss
 from equimorph.structures.margin import generic_vectors, inverse_step
+from equimorph.structures.metric import metric_length
 
 FIRST_MODE = 5.0
 """Lowest angular frequency at the start in units of 1/T: about that of a clamped arch."""
@@ -76,7 +77,7 @@ class DirectModel(Model):
         wide = generic_vectors(structure, 1)[0]
         for _ in range(SWEEPS):
             wide = inverse_step(structure, z, p, wide[None, :n])[0]
-            wide /= np.sqrt(structure.mass @ wide[:n] ** 2)
+            wide /= metric_length(structure, wide)
         step = PROBE * max(abs(time), 1e-12)
         rate = (motion(time + step) - motion(time - step)) / (2.0 * step)
         drive = -float(wide @ structure.parameter_derivative(z, p, rate[None])[0])

@@ -10,10 +10,11 @@ from equimorph.columns import Columns
 from equimorph.dynamics.own_equations import Motion
 from equimorph.equilibria import EnergyBarrier, lift, snap_landing
 from equimorph.equilibria.gradient_flow import Ending, gradient_flow
-from equimorph.equilibria.soft_modes import extent_of_guesses, metric_length, soft_modes
+from equimorph.equilibria.soft_modes import extent_of_guesses, soft_modes
 from equimorph.model import Descriptor
 from equimorph.structures import State, States, Structure
 from equimorph.structures.added_load import PUSH, Pushed
+from equimorph.structures.metric import metric_length
 from equimorph.tolerances import SAME_SOLUTION
 
 LARGEST_PUSH = 20.0
@@ -95,7 +96,7 @@ def _let_go(loaded: State, home: State) -> State | None:
             return None
         loaded = way.state
     end = State(structure, loaded.z, home.p)
-    gap = metric_length(structure, (end.z - home.z)[None, : structure.unknowns])[0]
+    gap = metric_length(structure, end.z - home.z)
     return None if gap <= SAME_SOLUTION else end
 
 
@@ -243,7 +244,7 @@ def _play(structure: Structure, launches: Launches, clock: Clock, *, watch: bool
 def _away(structure: Structure, z: Lanes, launches: Launches) -> tuple[Flags, Flags]:
     """Whether the flow leads elsewhere from configurations, and whether it fails."""
     ends, landed = relax(structure, z, launches.p)
-    gap = metric_length(structure, (ends - launches.home)[:, : structure.unknowns])
+    gap = metric_length(structure, ends - launches.home)
     return landed & (gap > SAME_SOLUTION), ~landed
 
 

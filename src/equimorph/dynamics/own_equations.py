@@ -9,9 +9,9 @@ from equimorph.arrays import Bool, Flags, Float, Lanes, Parameters, Values, Velo
 from equimorph.columns import Columns
 from equimorph.dynamics.direct import DirectModel, DirectPlant
 from equimorph.dynamics.model import Plant, Row
-from equimorph.equilibria.soft_modes import metric_length
 from equimorph.structures import State, Structure
 from equimorph.structures.added_load import dense_matrices
+from equimorph.structures.metric import metric_length
 
 NEWTON_STEPS = 25
 CONVERGED = 1e-9
@@ -88,7 +88,7 @@ class Motion(Columns):
             residual[:, :n] += _times(heavy[todo], z[todo, :n]) + force[todo]
             move = -_times(inverse[todo], residual)
             z[todo] += move
-            length = metric_length(structure, move[:, :n])
+            length = metric_length(structure, move)
             renew[todo] = length > SLOW * size[todo]
             size[todo] = length
             found[todo] = length < CONVERGED
@@ -169,4 +169,4 @@ class OwnPlant(DirectPlant):
     @property
     def speed(self) -> float:
         """Speed in the structure's metric."""
-        return float(np.sqrt(self.structure.mass @ self.velocity**2))
+        return float(metric_length(self.structure, self.velocity))

@@ -17,6 +17,7 @@ from equimorph.equilibria.trace import trace
 from equimorph.equilibria.trace_options import EventCode, TraceOptions
 from equimorph.model import Descriptor
 from equimorph.structures import Structure
+from equimorph.structures.metric import metric_length
 
 Offsets = Float[np.ndarray, "n k"]
 
@@ -307,7 +308,7 @@ class BoxPeaks:
         p = at.p.copy()
         p[:, self.places[axis]] += way * self.sizes[axis]
         change = way[:, None] * dz
-        size = np.sqrt(change[:, : self.structure.unknowns] ** 2 @ self.structure.mass)
+        size = metric_length(self.structure, change)
         guards = Guards(trust=LOOSE * np.maximum(size, 1e-12))
         near = settle(self.structure, at.z + change, p, guards=guards)
         slope = np.full(at.q.shape, np.nan)

@@ -8,8 +8,8 @@ import numpy as np
 
 from equimorph.arrays import Float, Lanes, Parameters, Values
 from equimorph.equilibria.curves import AlongCurve, Curve, along_parameters
-from equimorph.linalg.dense import multiply
 from equimorph.structures import Equations, LinearSystem
+from equimorph.structures.metric import metric_coordinates, metric_length
 
 THIRD_STEP = 2e-3
 """Step of differences for F_zzz, in the metric: of fourth order, with errors near 1e-11."""
@@ -82,7 +82,7 @@ class Critical:
         """Third derivative along v, the part of the unknowns that follow v², and their size."""
         structure, p, v = self.structure, self.p, self.v
         still = np.zeros_like(p)
-        norm = np.sqrt(multiply(v[:, : structure.unknowns] ** 2, structure.mass))
+        norm = metric_length(structure, v)
         h = THIRD_STEP / norm
 
         def at(shift: float) -> Values:
@@ -136,11 +136,9 @@ def null_vectors(
     structure: Equations, z: Lanes, p: Parameters
 ) -> tuple[Float[np.ndarray, "lanes unknowns"], Values]:
     """Null vectors on folds, as displacements of unit length in the metric, and φᵀF_zz[φ, φ]."""
-    n, root = structure.unknowns, np.sqrt(structure.mass)
     b = null_border(structure, z, p)
-    norm = np.linalg.norm(b[:, :n] * root, axis=1)
-    at = Critical(structure, z, p, np.ascontiguousarray(b * norm[:, None]))
-    return at.v[:, :n] * root, at.quadratic
+    at = Critical(structure, z, p, np.ascontiguousarray(b * metric_length(structure, b)[:, None]))
+    return metric_coordinates(structure, at.v), at.quadratic
 
 
 SKEW = 1e-4
@@ -200,9 +198,8 @@ class NormalForm:
 
 def normal_form(structure: Equations, z: Lanes, p: Parameters, dp: Parameters) -> NormalForm:
     """Coefficients at simple branch points of paths along `dp`; F_zzz by differences, to 1e-10."""
-    n, still = structure.unknowns, np.zeros_like(p)
-    b = null_border(structure, z, p)
-    norm = np.sqrt(multiply(b[:, :n] ** 2, structure.mass))
+    still, b = np.zeros_like(p), null_border(structure, z, p)
+    norm = metric_length(structure, b)
     # with b·v = 1 a border b·|b|_M makes v = φ of unit length in the metric
     at = Critical(structure, z, p, np.ascontiguousarray(b * norm[:, None]))
     phi = at.v

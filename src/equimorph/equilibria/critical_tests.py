@@ -14,6 +14,7 @@ from equimorph.equilibria.trace_options import EventKind
 from equimorph.errors import InputError
 from equimorph.model import Box, Constraint, position
 from equimorph.structures import State, Structure
+from equimorph.structures.metric import move_length
 
 TestsOf = Callable[[Int[np.ndarray, " some"]], Sequence[Test]]
 """Tests of some lanes, by their numbers: as many as parameters vary."""
@@ -91,17 +92,17 @@ def bound(constraint: Constraint) -> Test:
 def grazing(structure: Structure, constraint: Constraint, name: str) -> Test:
     """Change of a constraint along the path in one parameter, per unit length."""
     place = position(structure.parameters, name)
-    size, h = constraint.size, 1e-4
+    size, step = constraint.size, 1e-4
 
     def test(at: Critical) -> Values:
         dp = np.zeros_like(at.p)
         dp[:, place] = structure.scales[place]
         column = structure.parameter_derivative(at.z, at.p, dp)
         dz = -structure.solve(at.z, at.p, column[:, None]).x[:, 0]
-        length = np.sqrt(dz[:, : structure.unknowns] ** 2 @ structure.mass + 1.0)[:, None]
-        dz, dp = h * dz / length, h * dp / length
+        h = step / move_length(structure, dz, dp)[:, None]
+        dz, dp = h * dz, h * dp
         ahead, behind = (constraint.excess(at.z + s * dz, at.p + s * dp) for s in (1.0, -1.0))
-        return np.asarray((ahead - behind) / (2.0 * h * size))
+        return np.asarray((ahead - behind) / (2.0 * step * size))
 
     return test
 

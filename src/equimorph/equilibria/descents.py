@@ -16,9 +16,10 @@ from equimorph.equilibria.gradient_flow import (
     gradient_flow,
     implicit_step,
 )
-from equimorph.equilibria.soft_modes import Modes, SoftModes, metric_length, soft_modes
+from equimorph.equilibria.soft_modes import Modes, SoftModes, soft_modes
 from equimorph.linalg import multiply
 from equimorph.structures import Structure
+from equimorph.structures.metric import metric_length
 
 NUDGES = (0.002, 0.02, 0.2)
 """Distances from the start along its mode, in lengths of the mode, from which the flow is tried.

@@ -11,9 +11,9 @@ import numpy as np
 
 from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Values
-from equimorph.equilibria.soft_modes import metric_length
 from equimorph.errors import InputError
 from equimorph.structures import State, States
+from equimorph.structures.metric import metric_length
 
 Status = Literal[
     "landed",

@@ -8,8 +8,9 @@ import numpy as np
 from equimorph.arrays import Bool, Flags, Float, Int, Lanes, Numbers, Parameters, Some, Values
 from equimorph.columns import Columns
 from equimorph.equilibria.settle import Guards, settle
-from equimorph.equilibria.soft_modes import extents_of_guesses, metric_length
+from equimorph.equilibria.soft_modes import extents_of_guesses
 from equimorph.structures import Structure
+from equimorph.structures.metric import metric_length
 from equimorph.tolerances import CONVERGED, SAME_STATE
 
 
@@ -159,8 +160,8 @@ def implicit_step(
         dz = solution.x[:, 0]
         alive = np.isfinite(dz).all(axis=1)
         new[todo[alive]] += dz[alive]
-        size = metric_length(structure, dz[:, :n])
-        step = metric_length(structure, new[todo, :n] - z[todo, :n])
+        size = metric_length(structure, dz)
+        step = metric_length(structure, new[todo] - z[todo])
         small = alive & (size < SOLVED) & (size <= np.maximum(CLOSE * step, EXACT))
         solved[todo[small]] = solution.negative[small] == structure.constraints
         # corrections that grow lead to another minimum, if to any
@@ -254,10 +255,10 @@ def _advance(structure: Structure, front: _Front, p: Parameters, pace: Pace) -> 
 
 def _ends(structure: Structure, front: _Front, p: Parameters, pace: Pace) -> tuple[Numbers, Lanes]:
     """How flows end here, −1 where they go on; and the points, settled ones polished."""
-    n, z = structure.unknowns, front.z.copy()
+    z = front.z.copy()
     code = np.full(len(z), Ending.OPEN.value)
     solution = structure.solve(z, p, -structure.residual(z, p)[:, None])
-    size = metric_length(structure, solution.x[:, 0, :n])
+    size = metric_length(structure, solution.x[:, 0])
     index = solution.negative - structure.constraints
     near = np.where(index == 0, pace.near, NEAR_SADDLE) * front.travelled
     some = np.flatnonzero(front.moved & (size <= near))
@@ -266,7 +267,7 @@ def _ends(structure: Structure, front: _Front, p: Parameters, pace: Pace) -> tup
     # the Newton point belongs to the flow if the landscape is of one kind all along the step
     there, own, step = z[some] + solution.x[some, 0], index[some], size[some]
     again = structure.solve(there, p[some], -structure.residual(there, p[some])[:, None])
-    left = metric_length(structure, again.x[:, 0, :n])
+    left = metric_length(structure, again.x[:, 0])
     contracts = left <= np.maximum(CONTRACTION * step, CONVERGED)
     energy = structure.energy(z[some], p[some])
     falls = structure.energy(there, p[some]) <= energy + ROUND_OFF * (1.0 + np.abs(energy))
@@ -274,7 +275,7 @@ def _ends(structure: Structure, front: _Front, p: Parameters, pace: Pace) -> tup
     halfway = 0.5 * (z[some[good]] + there[good])
     good[good] = structure.index(halfway, p[some[good]]) == own[good]
     newton = settle(structure, there[good], p[some[good]], guards=Guards(iterations=15))
-    away = metric_length(structure, newton.z[:, :n] - there[good, :n])
+    away = metric_length(structure, newton.z - there[good])
     same = (
         newton.found
         & (newton.index == own[good])

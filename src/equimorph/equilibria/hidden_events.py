@@ -24,6 +24,7 @@ from equimorph.equilibria.trace import Traces
 from equimorph.equilibria.trace_options import EventCode, TraceOptions
 from equimorph.structures import Structure
 from equimorph.structures.margin import count_below, generic_vectors, inverse_step
+from equimorph.structures.metric import metric_length
 
 AT_ONCE = 1024
 """Points, or lanes, that are evaluated together: they stay in the cache."""
@@ -230,4 +231,5 @@ def _small_eigenvalue(structure: Structure, z: Lanes, p: Parameters) -> Values:
     vector, mass = generic_vectors(structure, len(z)), structure.mass
     answer = inverse_step(structure, z, p, vector)[:, : structure.unknowns]
     yielding = (answer * vector) @ mass
-    return np.asarray(np.abs(vector**2 @ mass / np.where(yielding == 0.0, np.inf, yielding)))
+    stiff = np.where(yielding == 0.0, np.inf, np.abs(yielding))
+    return np.asarray(metric_length(structure, vector) ** 2 / stiff)

@@ -10,9 +10,9 @@ from typing import Literal
 from equimorph.argument_checks import check_arguments
 from equimorph.equilibria.lift import Path, check_start, lift
 from equimorph.equilibria.snap import Landing, snap_landing
-from equimorph.equilibria.soft_modes import metric_length
 from equimorph.errors import InputError
 from equimorph.structures import State
+from equimorph.structures.metric import metric_length
 from equimorph.tolerances import SAME_SOLUTION
 
 CRITICAL = ("fold", "branch point", "multiple point")

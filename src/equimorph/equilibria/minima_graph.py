@@ -21,6 +21,7 @@ from equimorph.equilibria.random_search import PUSHED, Ground, Groups
 from equimorph.equilibria.saddles import Pairs, states_between
 from equimorph.linalg.graphs import components, walk_back
 from equimorph.structures import Growth
+from equimorph.structures.metric import metric_coordinates, metric_length
 from equimorph.tolerances import SAME_STATE
 
 TRIES = 60
@@ -95,8 +96,7 @@ class MinimaGraph:
 
     def _number(self, z: Float[np.ndarray, " size"], group: int) -> int:
         own = np.flatnonzero(self.group == group)
-        n, mass = self.ground.structure.unknowns, self.ground.structure.mass
-        gap = np.sqrt((self.z[own, :n] - z[:n]) ** 2 @ mass)
+        gap = metric_length(self.ground.structure, self.z[own] - z)
         if gap.min(initial=np.inf) <= SAME_STATE:
             return int(own[gap.argmin()])
         self.z, self.group = np.append(self.z, z[None], axis=0), np.append(self.group, group)
@@ -177,7 +177,7 @@ class MinimaGraph:
         left = TRIES - len(self.tried[group])
         if piece.max(initial=0) == 0 or left <= 0:
             return []
-        u = self.z[minima, : self.ground.structure.unknowns] * np.sqrt(self.ground.structure.mass)
+        u = metric_coordinates(self.ground.structure, self.z[minima])
         gaps = ((u[:, None] - u[None]) ** 2).sum(axis=2)
         gaps[piece[:, None] == piece] = 0.0
         place = {number: k for k, number in enumerate(minima.tolist())}

@@ -9,6 +9,7 @@ from equimorph.arrays import Bool, Flags, Float, Int, Lanes, Parameters, Setting
 from equimorph.equilibria.settle import Guards, settle
 from equimorph.model import Grid, position
 from equimorph.structures import Structure
+from equimorph.structures.metric import metric_length
 
 SHARE = 0.25
 """Largest correction of a step to a neighbour, relative to the step: beyond, it is not taken."""
@@ -154,12 +155,9 @@ def _neighbours(
 
 def _step(structure: Structure, z: Lanes, p: Parameters, target: Parameters) -> tuple[Lanes, Flags]:
     """States at `target` on the sheet of the stable states (z, p), and whether they are certain."""
-    n = structure.unknowns
     still, one, none = np.zeros_like(z), np.ones(len(z)), np.zeros(len(z))
     tangent = structure.advance(z, p, target - p, still, one, none).tangent_z
     near = settle(structure, z + tangent, target, guards=GUARDS)
     end = near.z
-    step, miss = (
-        np.sqrt(each[:, :n] ** 2 @ structure.mass) for each in (tangent, end - z - tangent)
-    )
+    step, miss = (metric_length(structure, each) for each in (tangent, end - z - tangent))
     return end, near.found & (miss <= SHARE * step + 1e-9) & (near.index == 0)

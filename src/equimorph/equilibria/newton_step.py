@@ -333,21 +333,3 @@ def free_directions(structure: Structure, free: Int[np.ndarray, "*_ k"], lanes: 
     lane = slice(None) if free.ndim == 1 else np.arange(lanes)[:, None]
     out[lane, np.arange(k), free] = structure.scales[free]
     return out
-
-
-def metric_places(
-    structure: Equations, z: Lanes, p: Parameters
-) -> Float[np.ndarray, "lanes coordinates"]:
-    """Configurations in the metric and scaled parameters: Euclidean distances measure."""
-    u = z[:, : structure.unknowns] * np.sqrt(structure.mass)
-    return np.concatenate([u, p / structure.scales], axis=1)
-
-
-def distances(
-    structure: Equations, z: Lanes, p: Parameters, other_z: Lanes, other_p: Parameters
-) -> Values:
-    """Distances of points in the metric and in the scaled parameters."""
-    n = structure.unknowns
-    squared = (z[:, :n] - other_z[:, :n]) ** 2 @ structure.mass
-    squared += (((p - other_p) / structure.scales) ** 2).sum(axis=1)
-    return np.asarray(np.sqrt(squared))

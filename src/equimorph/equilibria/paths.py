@@ -25,6 +25,7 @@ from equimorph.equilibria.trace_options import EventCode, EventKind, TraceOption
 from equimorph.errors import InputError
 from equimorph.model import Constraint, Descriptor, Progress
 from equimorph.structures import State, States
+from equimorph.structures.metric import metric_length
 from equimorph.tables import Table, Tabular
 from equimorph.tolerances import FEASIBLE
 
@@ -163,9 +164,8 @@ def lift_legs(states: States, within: tuple[Constraint, ...], options: TraceOpti
     outcome = trace(curve, begin.z.copy(), within, options)
     outcome = with_hidden_events(curve, begin.z, outcome, options)
     outcome = with_multiple_points(curve, begin.z, outcome)
-    n = structure.unknowns
-    gap = np.sqrt((outcome.z[:, :n] - end.z[:, :n]) ** 2 @ structure.mass)
-    arrived = (outcome.code == EventCode.ARRIVED) & (gap < JOINED)
+    joined = metric_length(structure, outcome.z - end.z) < JOINED
+    arrived = (outcome.code == EventCode.ARRIVED) & joined
     if len(outcome.passed.lanes) or not arrived.all():
         return None
     return _chain(states[0], curve, outcome, within)

@@ -17,6 +17,7 @@ from equimorph.columns import Columns
 from equimorph.equilibria.critical import Critical, Test
 from equimorph.model.descriptor import Evaluate
 from equimorph.structures.equations import Direction
+from equimorph.structures.metric import move_length
 
 VALUE_DIFFERENCE, TEST_DIFFERENCE = 1e-5, 1e-5
 """Steps of differences, in the metric: they set the rate of convergence, not the error."""
@@ -147,9 +148,7 @@ class Values(Columns):
         """By differences along the directions."""
         if self.reach < np.inf:
             structure = at.structure
-            squared = move.onto_z[:, : structure.unknowns] ** 2 @ structure.mass
-            squared += ((move.onto_p / structure.scales) ** 2).sum(axis=1)
-            near = (squared < self.reach**2)[:, None]
+            near = (move_length(structure, move.onto_z, move.onto_p) < self.reach)[:, None]
             onto = np.where(near, move.onto_z, 0.0), np.where(near, move.onto_p, 0.0)
             move = Move(*onto, move.along_z, move.along_p)
 
@@ -229,10 +228,8 @@ def _differences(
     """Values after the step onto the set and differences around it, all in one call."""
     lanes, k = move.along_z.shape[:2]
     structure = at.structure
-    u = move.along_z[:, :, : structure.unknowns]
-    squared = u**2 @ structure.mass
-    squared += ((move.along_p / structure.scales) ** 2).sum(axis=2)
-    h = step / np.sqrt(np.maximum(squared, 1e-300))  # directions may be long where F_z is soft
+    length = move_length(structure, move.along_z, move.along_p)
+    h = step / np.maximum(length, 1e-150)  # directions may be long where F_z is soft
     z = _rounds(at.z + move.onto_z, move.along_z, h, one_sided=one_sided)
     p = _rounds(at.p + move.onto_p, move.along_p, h, one_sided=one_sided)
     flat = scalars(z, p)

@@ -18,6 +18,7 @@ from equimorph.linalg.apart import firsts_apart
 from equimorph.model import Constraint, worst_relative_excess
 from equimorph.structures import Structure
 from equimorph.structures.contract import Symmetry
+from equimorph.structures.metric import metric_coordinates
 from equimorph.tolerances import SAME_STATE
 
 Groups = Numbers
@@ -311,5 +312,4 @@ def distinct(structure: Structure, z: Lanes, known: int = 0) -> Int[np.ndarray, 
 
     The first `known` are taken to be different.
     """
-    u = z[:, : structure.unknowns] * np.sqrt(structure.mass)
-    return firsts_apart(u, SAME_STATE, known)
+    return firsts_apart(metric_coordinates(structure, z), SAME_STATE, known)

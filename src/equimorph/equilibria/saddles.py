@@ -14,10 +14,10 @@ from equimorph.equilibria.curves import growing_force
 from equimorph.equilibria.energy_barriers import Status
 from equimorph.equilibria.gradient_flow import Ending
 from equimorph.equilibria.settle import Guards, settle
-from equimorph.equilibria.soft_modes import metric_length
 from equimorph.equilibria.trace import trace
 from equimorph.equilibria.trace_options import EventCode, TraceOptions
 from equimorph.structures import Structure
+from equimorph.structures.metric import metric_length
 
 
 class Nowhere(IntEnum):
@@ -115,7 +115,7 @@ class Pairs(Columns):
 
     def distance(self, structure: Structure) -> Values:
         """Distances in the metric."""
-        return metric_length(structure, (self.goal - self.start)[:, : structure.unknowns])
+        return metric_length(structure, self.goal - self.start)
 
 
 @dataclass(frozen=True)

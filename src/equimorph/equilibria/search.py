@@ -18,6 +18,7 @@ from equimorph.equilibria.minima_graph import Argument, MinimaGraph, arguments_o
 from equimorph.equilibria.random_search import BEYOND, UNRESOLVED, Ground, Pools, distinct
 from equimorph.model import Constraint, parameter_vector
 from equimorph.structures import States, Structure
+from equimorph.structures.metric import metric_length
 
 Points = Float[np.ndarray, "points parameters"]
 
@@ -275,8 +276,7 @@ class _Catch:
         captured = np.zeros((self.runs, len(kept)), bool)
         mine = self.valid[self.run[self.valid] != NO_RUN]
         if len(mine):
-            n = self.ground.structure.unknowns
-            gap = (self.z[mine, None, :n] - kept[None, :, :n]) ** 2 @ self.ground.structure.mass
+            gap = metric_length(self.ground.structure, self.z[mine, None] - kept)
             captured[self.run[mine], gap.argmin(axis=1)] = True
         return captured
 

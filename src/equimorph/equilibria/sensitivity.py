@@ -7,6 +7,7 @@ import numpy as np
 from equimorph.arrays import Float, Int, Lanes, Parameters, Values
 from equimorph.model import Descriptor
 from equimorph.structures import Structure
+from equimorph.structures.metric import move_length
 
 Function = Callable[[Lanes, Parameters], Values]
 DIFFERENCE = 1e-3
@@ -41,10 +42,9 @@ def slopes_along(
     functions: Sequence[Function],
 ) -> Float[np.ndarray, "lanes m k"]:
     """Derivatives of functions along directions (dz, dp) from states."""
-    n, (lanes, k, _) = structure.unknowns, dz.shape
+    lanes, k, _ = dz.shape
     # the softer the direction, the shorter the step, so that differences stay small in the metric
-    size = np.sqrt(dz[:, :, :n] ** 2 @ structure.mass + ((dp / structure.scales) ** 2).sum(axis=2))
-    h = (DIFFERENCE / np.maximum(size, 1e-300))[:, :, None]
+    h = (DIFFERENCE / np.maximum(move_length(structure, dz, dp), 1e-300))[:, :, None]
     shifts = np.array([-2.0, -1.0, 1.0, 2.0])
     trial_z = (z[:, None, None] + shifts[:, None] * (h * dz)[:, :, None]).reshape(-1, z.shape[1])
     trial_p = (p[:, None, None] + shifts[:, None] * (h * dp)[:, :, None]).reshape(-1, p.shape[1])

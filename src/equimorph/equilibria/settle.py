@@ -35,7 +35,6 @@ from equimorph.equilibria.newton_step import (
     Problem,
     Step,
     Tangents,
-    distances,
     free_directions,
     start_at,
     weights_of,
@@ -44,6 +43,7 @@ from equimorph.equilibria.point_conditions import Condition
 from equimorph.model import Constraint
 from equimorph.structures import Equations, Structure, newton_kernels
 from equimorph.structures.margin import count_below
+from equimorph.structures.metric import distances, metric_length, products_with
 from equimorph.structures.newton import Limits, Newton, Through, newton
 from equimorph.structures.newton_kernels import FOUND, NEAR, OPEN
 
@@ -246,12 +246,9 @@ def _by_steps(
 
 def embedded_planes(structure: Structure, free: Int[np.ndarray, " d"], rows: Rows) -> Planes:
     """Planes whose rows are given in the metric: √mass·u, then free parameters in their scales."""
-    n = structure.unknowns
-    by_z = np.zeros((*rows.shape[:2], structure.size))
     by_p = np.zeros((*rows.shape[:2], len(structure.parameters)))
-    by_z[:, :, :n] = rows[:, :, :n] * np.sqrt(structure.mass)
-    by_p[:, :, free] = rows[:, :, n:] / structure.scales[free]
-    return Planes(by_z, by_p)
+    by_p[:, :, free] = rows[:, :, structure.unknowns :] / structure.scales[free]
+    return Planes(products_with(structure, rows), by_p)
 
 
 class _Run:
@@ -325,7 +322,7 @@ def _lengthening(
         return np.ones(len(here.z))
     structure, n = here.problem.structure, here.problem.structure.unknowns
     gap = here.z[:, None, :n] - known
-    squared = gap**2 @ structure.mass
+    squared = metric_length(structure, gap) ** 2
     along = np.einsum("lri,i,li->lr", gap, structure.mass, step.change[:, :n])
     slopes = -2.0 * along / (squared * (1.0 + squared))
     return np.asarray(1.0 / (1.0 - np.nansum(slopes, axis=1)))

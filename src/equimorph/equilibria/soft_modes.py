@@ -12,6 +12,7 @@ from equimorph.columns import Columns
 from equimorph.linalg import multiply
 from equimorph.structures import Structure, stability_margin
 from equimorph.structures.margin import generic_vectors, inverse_step
+from equimorph.structures.metric import metric_length
 from equimorph.tolerances import SAME_STATE
 
 Modes = Float[np.ndarray, "lanes unknowns"]
@@ -85,11 +86,6 @@ def soft_modes(structure: Structure, z: Lanes, p: Parameters) -> SoftModes:
     lengths, rate, critical = _lengths(structure, z, p, mode, eigenvalue)
     stiffness = np.where(stiffness > 0.0, np.maximum(stiffness, np.abs(eigenvalue)), rate)
     return SoftModes(eigenvalue, mode, stiffness, *lengths, rate, critical)
-
-
-def metric_length(structure: Structure, du: Modes) -> Values:
-    """Length of changes of the unknowns."""
-    return np.asarray(np.sqrt(multiply(du**2, structure.mass)))
 
 
 def extent_of_guesses(structure: Structure, p: Parameters) -> float:

@@ -19,10 +19,10 @@ from equimorph.equilibria.gradient_flow import FAITHFUL, SMOOTH
 from equimorph.equilibria.minima_graph import NONE, Argument, arguments_of
 from equimorph.equilibria.saddles import Nowhere, ways_over
 from equimorph.equilibria.search import search_with_graph
-from equimorph.equilibria.soft_modes import metric_length
 from equimorph.errors import InputError
 from equimorph.model import Constraint, parameter_vector
 from equimorph.structures import State, States, Structure, join_states
+from equimorph.structures.metric import metric_length
 from equimorph.tolerances import SAME_PLACE, SAME_SOLUTION
 
 

@@ -152,6 +152,16 @@ def multiply_lanes(x, matrix, out):
 
 
 @njit(**FLAGS)
+def metric_lengths(x, mass, out):
+    """Lengths of the first entries of rows of x, whose squares count by masses."""
+    for lane in range(x.shape[0]):
+        total = 0.0
+        for i in range(len(mass)):
+            total += x[lane, i] ** 2 * mass[i]
+        out[lane] = np.sqrt(total)
+
+
+@njit(**FLAGS)
 def largest_products(x, matrix, out):
     """Largest entries, by size, of rows of x times a matrix."""
     totals = np.empty(matrix.shape[1])

@@ -11,6 +11,7 @@ from equimorph.manifold import Division, EquilibriumSet
 from equimorph.manifold.geometry.topology import pieces
 from equimorph.model import position
 from equimorph.structures import States
+from equimorph.structures.metric import metric_length
 from equimorph.tasks.route import Route
 from equimorph.tolerances import ON_SIDE
 
@@ -143,8 +144,7 @@ def states_along(path: Path, count: int) -> States:
     z = known.z[after - 1] + share[:, None] * (known.z[after] - known.z[after - 1])
     p = known.p[after - 1] + share[:, None] * (known.p[after] - known.p[after - 1])
     solved = settle(structure, z, p)
-    shift = (solved.z - z)[:, : structure.unknowns]
-    found = solved.found & (np.sqrt(shift**2 @ structure.mass) <= 0.5 * width)
+    found = solved.found & (metric_length(structure, solved.z - z) <= 0.5 * width)
     found &= (share > 0) & (share < 1)  # known states stay as they are
     nearest = np.where(share < 0.5, after - 1, after)
     z = np.where(found[:, None], solved.z, known.z[nearest])

@@ -15,6 +15,7 @@ from equimorph.columns import Columns
 from equimorph.linalg import BorderedSolution
 from equimorph.linalg.lanes import in_background, threads
 from equimorph.structures.equations import Shift
+from equimorph.structures.metric import metric_length
 
 RELATIVE = 1e-11
 """Relative change of an eigenvalue at which an iteration ends."""
@@ -166,7 +167,7 @@ def first_pairs(structure: Pencil, lanes: int) -> Pairs:
     at, count = np.arange(n), np.array([[2.0], [3.0]])
     pair = np.sin(np.pi * count * (at + 1) / (n + 1)) + 0.1 * np.cos((count - 0.7) * at)
     pairs = np.zeros((lanes, 2, structure.size))
-    pairs[:, :, :n] = pair / np.sqrt(pair**2 @ structure.mass)[:, None]
+    pairs[:, :, :n] = pair / metric_length(structure, pair)[:, None]
     return pairs
 
 

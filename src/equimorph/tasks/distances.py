@@ -3,16 +3,14 @@
 import numpy as np
 
 from equimorph.arrays import Float, Int, Values
-from equimorph.equilibria.newton_step import metric_places
-from equimorph.equilibria.settle import distances
 from equimorph.linalg.apart import firsts_apart
 from equimorph.structures import State, States
+from equimorph.structures.metric import distances, metric_length, metric_places
 
 
 def distance(a: State, b: State) -> float:
     """Distance of two configurations in the structure's metric."""
-    n = a.structure.unknowns
-    return float(np.sqrt((a.z[:n] - b.z[:n]) ** 2 @ a.structure.mass))
+    return float(metric_length(a.structure, a.z - b.z))
 
 
 def step_lengths(states: States) -> Float[np.ndarray, " steps"]:

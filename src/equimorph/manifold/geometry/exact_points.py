@@ -29,6 +29,7 @@ from equimorph.manifold.geometry.crossings import reduction
 from equimorph.manifold.geometry.points import Points, VertexKind
 from equimorph.manifold.geometry.setting import Setting, embed, principal_directions
 from equimorph.model import worst_excess
+from equimorph.structures.metric import products_with
 
 Span = Float[np.ndarray, "lanes k d"]
 
@@ -126,10 +127,9 @@ class Aim(Columns):
         self, rows: Float[np.ndarray, "lanes m coordinates"]
     ) -> tuple[Float[np.ndarray, "lanes m size"], Float[np.ndarray, "lanes m parameters"]]:
         """What changes of z and p are multiplied by to give their products with rows."""
-        setting, n = self.setting, self.setting.structure.unknowns
-        by_z = np.zeros((*rows.shape[:2], setting.structure.size))
-        by_z[:, :, :n] = rows[:, :, :n] * np.sqrt(setting.structure.mass)
-        return by_z, self._changes(rows[:, :, n:] / setting.scales)
+        structure, scales = self.setting.structure, self.setting.scales
+        by_p = self._changes(rows[:, :, structure.unknowns :] / scales)
+        return products_with(structure, rows), by_p
 
     def conditions(self, z: Lanes, p: Parameters) -> tuple[Condition, ...]:
         """As many scalars as directions; none for plain points: no step leaves their planes."""

@@ -7,6 +7,7 @@ import numpy as np
 from equimorph.arrays import Float, Int, Lanes, Parameters, Place
 from equimorph.model import Constraint
 from equimorph.structures import Structure
+from equimorph.structures.metric import metric_coordinates
 
 
 @dataclass(frozen=True)
@@ -42,8 +43,7 @@ Coordinates = Float[np.ndarray, "lanes coordinates"]
 
 def embed(setting: Setting, z: Lanes, p: Parameters) -> Coordinates:
     """Configuration in the metric and scaled free parameters: Euclidean distances measure."""
-    structure = setting.structure
-    u = z[:, : structure.unknowns] * np.sqrt(structure.mass)
+    u = metric_coordinates(setting.structure, z)
     return np.concatenate([u, p[:, setting.free] / setting.scales], axis=1)
 
 

@@ -27,6 +27,7 @@ from equimorph.linalg import orthonormal_rows
 from equimorph.manifold.geometry.setting import Setting, embed
 from equimorph.manifold.geometry.simplices import squared_sides
 from equimorph.model import worst_excess
+from equimorph.structures.metric import metric_coordinates, products_with
 from equimorph.tolerances import METRIC_DIFFERENCE
 
 CHUNK = 2048
@@ -74,18 +75,16 @@ def _solve_in_planes(
     rhs: Float[np.ndarray, "lanes sides full"],
 ) -> Float[np.ndarray, "lanes sides full"]:
     """Solve with F_z and F_p at points, bordered by rows of the embedding."""
-    structure, n = setting.structure, setting.structure.unknowns
+    structure = setting.structure
     system = structure.linear_system(z, p, free_directions(structure, setting.free, len(z)))
-    by_z = np.zeros((*rows.shape[:2], z.shape[1]))
-    by_z[:, :, :n] = rows[:, :, :n] * np.sqrt(structure.mass)
-    return system.solve(rhs, (system.columns, by_z, rows[:, :, n:])).x
+    by_z = products_with(structure, rows)
+    return system.solve(rhs, (system.columns, by_z, rows[:, :, structure.unknowns :])).x
 
 
 def frames_in_embedding(setting: Setting, frames: Frames) -> Rows:
     """Bases of tangent spaces in the coordinates of the embedding."""
-    n, d = setting.structure.unknowns, len(setting.free)
-    u = frames[:, :, :n] * np.sqrt(setting.structure.mass)
-    return np.concatenate([u, frames[:, :, frames.shape[2] - d :]], axis=2)
+    u = metric_coordinates(setting.structure, frames)
+    return np.concatenate([u, frames[:, :, frames.shape[2] - len(setting.free) :]], axis=2)
 
 
 def split_step(setting: Setting, step: Float[np.ndarray, "lanes full"]) -> tuple[Lanes, Parameters]:

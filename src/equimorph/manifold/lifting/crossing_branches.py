@@ -17,7 +17,6 @@ from equimorph.equilibria.critical import null_border
 from equimorph.equilibria.steps import Front, step_along
 from equimorph.equilibria.trace import trace
 from equimorph.equilibria.trace_options import EventCode
-from equimorph.linalg.dense import multiply
 from equimorph.manifold.complex.marked_complex import TRIANGLES
 from equimorph.manifold.geometry.crossings import reduction
 from equimorph.manifold.geometry.points import VertexKind
@@ -26,6 +25,7 @@ from equimorph.manifold.lifting.flood import flood
 from equimorph.manifold.lifting.pairing import Pairing
 from equimorph.manifold.lifting.seeds import Seeds, polish
 from equimorph.model import Progress, are_feasible
+from equimorph.structures.metric import metric_length
 
 DISTANCES = (0.03, 0.003, 0.0003, 3e-5, 3e-6)
 """Lengths of the first step from a crossing, in the metric, tried one after the other: of
@@ -263,6 +263,5 @@ def _tangents(
     dz = np.einsum("lfk,lki->lfi", four, known.along_z).reshape(-1, z.shape[1])
     dt = (four[:, :, 1] / length[:, None]).ravel()
     weight = np.repeat(line.weight, 4)
-    n = structure.unknowns
-    norm = np.sqrt(multiply(dz[:, :n] ** 2, structure.mass) + (weight * dt) ** 2)
+    norm = np.hypot(metric_length(structure, dz), weight * dt)
     return dz / norm[:, None], dt / norm

@@ -14,13 +14,13 @@ from scipy.optimize import brentq
 from equimorph.arrays import Float, ItemValues
 from equimorph.equilibria.critical import Critical, null_border
 from equimorph.equilibria.settle import lower_index
-from equimorph.linalg.dense import multiply
 from equimorph.manifold.geometry.exact_points import Aim, Pinned, correct_points, pin_crossings
 from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.lifting.pairing import Pairing
 from equimorph.manifold.lifting.polygon_cuts import MEETING, Chord, Plan, crossed_chords, planes
 from equimorph.structures.margin import count_below
+from equimorph.structures.metric import metric_length
 
 Ways = list[list[Chord]]
 
@@ -252,8 +252,8 @@ def _coefficients(
 
     Near a hub another one is as good a null vector.
     """
-    structure, n = pairing.setting.structure, pairing.setting.structure.unknowns
+    structure = pairing.setting.structure
     v = Critical(structure, z, p, np.tile(sense, (len(z), 1))).v
-    norm = np.sqrt(multiply(v[:, :n] ** 2, structure.mass)) / (v**2).sum(axis=1)
+    norm = metric_length(structure, v) / (v**2).sum(axis=1)
     at = Critical(structure, z, p, np.ascontiguousarray(v * norm[:, None]))
     return at.quadratic, at.cubic

@@ -27,6 +27,7 @@ from equimorph.manifold.geometry.tangents import (
 from equimorph.manifold.lifting.courses import on_sides
 from equimorph.manifold.lifting.pairing import FoldExit, Pairing
 from equimorph.model import are_feasible, worst_excess
+from equimorph.structures.metric import metric_coordinates
 
 NOISE = 1e-6
 """Distance in the metric below which two folds are one."""
@@ -236,7 +237,7 @@ def _tangents(
     forms = fold_forms(setting, z, p)
     # the set near a fold: along the null vector, and along the fold in the parameters
     rows = np.zeros((len(z), d, n + d))
-    rows[:, 0, :n] = forms.null[:, :n] * np.sqrt(setting.structure.mass)
+    rows[:, 0, :n] = metric_coordinates(setting.structure, forms.null)
     along = np.linalg.svd(forms.slope[:, None])[2][:, 1:]
     rows[:, 1:, n:] = along
     rows[:, 0] /= np.linalg.norm(rows[:, 0], axis=1, keepdims=True)

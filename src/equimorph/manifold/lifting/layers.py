@@ -11,7 +11,6 @@ import numpy as np
 
 from equimorph.arrays import Int, Items, Lanes, Parameters, Place
 from equimorph.equilibria.critical import null_border
-from equimorph.linalg.dense import multiply
 from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.lifting.cells import CellFinder, Cells, Close
 from equimorph.manifold.lifting.crossing_branches import (
@@ -26,6 +25,7 @@ from equimorph.manifold.lifting.fold_walks import NOISE, fold_at, fold_exits
 from equimorph.manifold.lifting.grid import NEAR_AN_END
 from equimorph.manifold.lifting.pairing import FoldExit, Pairing
 from equimorph.model import Progress
+from equimorph.structures.metric import metric_length
 
 
 def find_through_layers(
@@ -71,9 +71,9 @@ def _same(one: FoldExit, other: FoldExit) -> bool:
 def _enter(pairing: Pairing, edge: Items, z: Lanes, p: Parameters) -> bool:
     """Follow both halves of the curves through folds over edges, and enter what they lead to."""
     setting, store = pairing.setting, pairing.points
-    structure, n = setting.structure, setting.structure.unknowns
+    structure = setting.structure
     phi = null_border(structure, z, p)
-    phi /= np.sqrt(multiply(phi[:, :n] ** 2, structure.mass))[:, None]
+    phi /= metric_length(structure, phi)[:, None]
     owner, sense = np.divmod(np.arange(HALVES * len(z)), HALVES)
     line = edge_lines(pairing, edge).take(owner)
     tangents = np.where(sense, -1.0, 1.0)[:, None] * phi[owner], np.zeros(len(owner))

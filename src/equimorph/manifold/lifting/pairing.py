@@ -19,6 +19,7 @@ from equimorph.manifold.complex.base_mesh import BaseMesh
 from equimorph.manifold.geometry.points import Points, VertexKind
 from equimorph.manifold.geometry.setting import Setting
 from equimorph.manifold.lifting.curves import Curves
+from equimorph.structures.metric import metric_length
 from equimorph.tolerances import SAME_STATE
 
 NONE = -1
@@ -181,10 +182,9 @@ class Pairing:
         self, z: Float[np.ndarray, " size"], p: Float[np.ndarray, " P"], index: int, edge: int
     ) -> int:
         """Number of a polished crossing point on an edge, known or added."""
-        known, n = self.crossings.setdefault(edge, []), self.setting.structure.unknowns
+        known = self.crossings.setdefault(edge, [])
         for point in known:
-            gap = self.points.z[point, :n] - z[:n]
-            if gap**2 @ self.setting.structure.mass < SAME_STATE**2:
+            if metric_length(self.setting.structure, self.points.z[point] - z) < SAME_STATE:
                 return point
         known.append(self.points.add(z, p, index, VertexKind.CROSSING, edge))
         return known[-1]

@@ -11,10 +11,10 @@ import numpy as np
 from equimorph.arrays import Flags, Int, Lanes, Parameters, Place
 from equimorph.equilibria.critical import Critical, null_border
 from equimorph.equilibria.settle import Guards, free_directions, settle
-from equimorph.linalg.dense import multiply
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.model import Box, are_feasible
 from equimorph.structures import States, join_states
+from equimorph.structures.metric import metric_length
 from equimorph.tolerances import SAME_SOLUTION
 
 ITERATIONS = 40
@@ -71,7 +71,6 @@ def are_grazing(states: States) -> Flags:
     """
     structure, z, p = states.structure, states.z, states.p
     critical = Critical(structure, z, p, null_border(structure, z, p))
-    n = structure.unknowns
-    length = np.sqrt(multiply(critical.v[:, :n] ** 2, structure.mass))
+    length = metric_length(structure, critical.v)
     near = np.abs(critical.g) * length <= SAME_SOLUTION * np.abs(critical.quadratic)
     return np.asarray(near)

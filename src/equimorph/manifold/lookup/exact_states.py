@@ -13,6 +13,7 @@ from equimorph.equilibria.trace_options import EventCode
 from equimorph.manifold.lookup.kernels import root_shares
 from equimorph.model import Constraint
 from equimorph.structures import States, Structure
+from equimorph.structures.metric import metric_coordinates, metric_length
 from equimorph.structures.newton import Limits, newton
 from equimorph.tolerances import SAME_STATE
 
@@ -147,11 +148,10 @@ def nearest_pairs(
     `pairs` has the numbers of the state and the guess of each. Some are compared at a time, because
     of thousands of states of many unknowns the copies would be longer to write than to compare.
     """
-    n, gap = structure.unknowns, np.empty(len(group))
+    gap = np.empty(len(group))
     for at in range(0, len(gap), COMPARED):
         state, number = pairs[:, at : at + COMPARED]
-        apart = z[state, :n] - guess[number, :n]
-        gap[at : at + COMPARED] = apart**2 @ structure.mass
+        gap[at : at + COMPARED] = metric_length(structure, z[state] - guess[number])
     order = np.lexsort((gap, group))
     rank = np.arange(len(order)) - np.searchsorted(group, group[order])
     return np.sort(order[rank < NEAREST])
@@ -168,7 +168,7 @@ def root_weights(
 
 def first_of_same(structure: Structure, z: Lanes) -> Int[np.ndarray, " distinct"]:
     """States that no earlier one is the same as."""
-    u = z[:, : structure.unknowns] * np.sqrt(structure.mass)
+    u = metric_coordinates(structure, z)
     return np.flatnonzero(~np.tril(cdist(u, u) <= SAME_STATE, -1).any(axis=1))
 
 

@@ -34,13 +34,13 @@ from equimorph.equilibria.critical import Critical, null_border
 from equimorph.equilibria.hidden_events import multiplicity
 from equimorph.equilibria.newton_step import Planes
 from equimorph.equilibria.settle import Guards, Settled, lower_index, settle
-from equimorph.linalg.dense import multiply
 from equimorph.manifold.geometry.exact_points import Aim, Pinned, correct_points
 from equimorph.manifold.geometry.setting import Setting, embed
 from equimorph.manifold.geometry.simplices import shares_in
 from equimorph.manifold.geometry.topology import Adjacency, keys_of, rows_of
 from equimorph.manifold.lookup.cell_index import Hits
 from equimorph.structures import States, Structure
+from equimorph.structures.metric import metric_length
 
 Parameters = Float[np.ndarray, "_ P"]
 Series = Float[np.ndarray, "coefficients lanes"]
@@ -183,7 +183,7 @@ class NearCrossings:
         structure = self.setting.structure
         b = null_border(structure, z, own)
         v = Critical(structure, z, own, b).v
-        size = np.sqrt(multiply(v[:, : structure.unknowns] ** 2, structure.mass))
+        size = metric_length(structure, v)
         r = np.einsum("li,li->l", v, structure.residual(z, own))
         r[np.abs(r) <= ROUND_OFF] = 0.0
         return Centres(z, own, b, size, r, lower_index(self.setting.structure, z, own), at)
@@ -253,7 +253,7 @@ class NearCrossings:
             inner = np.abs(s) <= WIDE / same.size
             own, same, s = own[inner], same.take(inner), s[inner]
             there, _, _, good = self._along(same, p[same.point], s)
-            gap = np.sqrt((there - z[own])[:, : structure.unknowns] ** 2 @ structure.mass)
+            gap = metric_length(structure, there - z[own])
             out[own[good & (gap <= MERGED)]] = True
         return out
 

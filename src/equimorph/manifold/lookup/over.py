@@ -43,6 +43,7 @@ from equimorph.manifold.lookup.near_cusps import NearCusps, united
 from equimorph.manifold.lookup.rims import Rims, nearest_rims, ways_out
 from equimorph.model import Constraint, are_feasible
 from equimorph.structures import States, Structure
+from equimorph.structures.metric import metric_length
 from equimorph.tolerances import SAME_SOLUTION, SAME_STATE
 
 OVERHANG = 0.3
@@ -170,8 +171,7 @@ class Sheets:
         return known, cell
 
     def _are_same(self, z: Lanes, other: Lanes) -> Flags:
-        n = self.structure.unknowns
-        return np.asarray((z[:, :n] - other[:, :n]) ** 2 @ self.structure.mass <= SAME_SOLUTION**2)
+        return np.asarray(metric_length(self.structure, z - other) <= SAME_SOLUTION)
 
     def _beside_cusps(self, p: Points, first: int) -> Found | None:
         """States over points that cells next to cusps hide, if any; `first` is added."""
@@ -285,11 +285,11 @@ class Sheets:
     @cached_property
     def _room(self) -> Float[np.ndarray, " C"]:
         """How far states may be from their guess: twice the longest side from the first corner."""
-        u = self.points.z[:, : self.structure.unknowns]
-        first, longest = u[self.cells[:, 0]], np.zeros(len(self.cells))
+        first, longest = self.points.z[self.cells[:, 0]], np.zeros(len(self.cells))
         for corner in self.cells.T[1:]:
-            np.maximum(longest, (u[corner] - first) ** 2 @ self.structure.mass, out=longest)
-        return 2.0 * np.sqrt(longest) + SAME_STATE
+            side = metric_length(self.structure, self.points.z[corner] - first)
+            np.maximum(longest, side, out=longest)
+        return 2.0 * longest + SAME_STATE
 
     def _search(self, p: Points, near: Hits) -> Iterator[Found]:
         """States over points by lifts and Newton from all regular vertices near each of them."""
@@ -385,8 +385,7 @@ class Sheets:
 
     def _nearest(self, z: Lanes, index: Numbers, guess: Guesses, mine: Hits) -> Items:
         """Cell of the same index whose interpolation over the point is nearest to each state."""
-        n, mass = self.structure.unknowns, self.structure.mass
-        gap = ((z[:, None, :n] - guess[None, :, :n]) ** 2) @ mass
+        gap = metric_length(self.structure, z[:, None] - guess)
         gap[index[:, None] != self.cell_index[mine.cell][None]] = np.inf
         if len(guess) == 0:
             return np.full(len(z), -1)

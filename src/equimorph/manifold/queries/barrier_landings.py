@@ -12,11 +12,11 @@ from equimorph.arrays import Flags, Float, Int, Lanes, Numbers, Parameters, Some
 from equimorph.equilibria.descents import descend
 from equimorph.equilibria.gradient_flow import FAITHFUL, Ending
 from equimorph.equilibria.saddles import Nowhere
-from equimorph.equilibria.soft_modes import metric_length
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.manifold.lookup.exact_states import StatesOver, exact_states, lift_to
 from equimorph.model import Progress
 from equimorph.structures import States, Structure
+from equimorph.structures.metric import metric_length
 from equimorph.tolerances import SAME_SOLUTION
 
 CHUNK = 512
@@ -99,10 +99,9 @@ def _of_cells(
 
     The mode of a corner may point to the other side than that of the first one.
     """
-    n = structure.unknowns
 
     def gap(one: np.ndarray, other: np.ndarray) -> Float[np.ndarray, "..."]:
-        return np.asarray((one - other)[..., :n] ** 2 @ structure.mass)
+        return metric_length(structure, one - other) ** 2
 
     first, turned = ends[:, :1], ends[:, :, ::-1]
     swap = gap(turned, first).sum(axis=2) < gap(ends, first).sum(axis=2)

@@ -25,7 +25,6 @@ from equimorph.arrays import (
 from equimorph.equilibria import EnergyBarrier
 from equimorph.equilibria.saddles import Nowhere, ways_over
 from equimorph.equilibria.snap import CRITICAL
-from equimorph.equilibria.soft_modes import metric_length
 from equimorph.errors import InputError
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.manifold.geometry.points import on_fold
@@ -45,6 +44,7 @@ from equimorph.manifold.queries.barrier_landings import (
 from equimorph.model import Descriptor, Progress, Silent
 from equimorph.structures import States
 from equimorph.structures.margin import count_below
+from equimorph.structures.metric import metric_length
 from equimorph.tolerances import SAME_PLACE, SAME_SOLUTION, SAME_STATE
 
 WIDTH = 1.0
@@ -315,15 +315,14 @@ class SetBarriers:
     ) -> tuple[Ends, Flags]:
         """Ends of descents as from the corners of the cells; whether they are certain."""
         structure, known, eset = self.eset.structure, self.landings, self.eset
-        n, cell = structure.unknowns, over.cell[saddles]
+        cell = over.cell[saddles]
         row = known.row[cell]
         x = over.states.p[saddles][:, eset.setting.free]
         folded = on_fold(eset.kinds[eset.cells[cell]])
         shares = np.clip(np.nan_to_num(self._maps.weights(x, cell)), 0.0, 1.0)
         weights = root_weights(shares / shares.sum(axis=1, keepdims=True), folded)
-        guess = np.einsum("sc,scek->sek", weights, known.ends[row][..., :n])
-        gap = np.sqrt((over.states.z[minima][:, None, :, :n] - guess[:, :, None]) ** 2
-                      @ structure.mass)  # fmt: skip
+        guess = np.einsum("sc,scek->sek", weights, known.ends[row])
+        gap = metric_length(structure, over.states.z[minima][:, None] - guess[:, :, None])
         gap[np.broadcast_to((minima < 0)[:, None], gap.shape)] = np.inf
         order = np.argsort(gap, axis=2)
         nearest, *others = np.moveaxis(np.take_along_axis(gap, order, axis=2), 2, 0)

@@ -7,7 +7,6 @@ import numpy as np
 
 from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Flags, Float, Int, Lanes, Parameters
-from equimorph.equilibria.newton_step import metric_places
 from equimorph.errors import InputError
 from equimorph.linalg.apart import firsts_apart
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
@@ -17,6 +16,7 @@ from equimorph.manifold.queries.least_squares import nearest
 from equimorph.manifold.queries.nearest import Ground, SetPoints, local_minima, points_at_vertices
 from equimorph.model import Descriptor, position
 from equimorph.structures import State, States, Structure
+from equimorph.structures.metric import metric_length, metric_places
 from equimorph.tolerances import SAME_SOLUTION
 
 CANDIDATES = 12
@@ -262,8 +262,7 @@ def _place_over(eset: EquilibriumSet, state: State) -> tuple[StatesOver, int] | 
     # round-off may have put it a little beyond a side of the box
     at = {name: np.array([np.clip(state[name], low, high)]) for name, low, high in sides}
     here = eset.over(**at)
-    n, mass = eset.structure.unknowns, eset.structure.mass
-    gap = np.sqrt((here.states.z - state.z)[:, :n] ** 2 @ mass)
+    gap = metric_length(eset.structure, here.states.z - state.z)
     # next to a fold a state over rounded parameters moves by the root of round-off
     near = np.flatnonzero(gap < 10.0 * SAME_SOLUTION)
     return (here, int(near[gap[near].argmin()])) if len(near) else None

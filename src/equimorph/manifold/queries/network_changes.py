@@ -9,7 +9,6 @@ import numpy as np
 
 from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Flags, Int, Lanes, Parameters, Values
-from equimorph.equilibria.soft_modes import metric_length
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.manifold.lookup.exact_states import StatesOver
 from equimorph.manifold.queries.barrier_landings import over_parameters
@@ -17,6 +16,7 @@ from equimorph.manifold.queries.barriers import SetBarriers, nearest_states
 from equimorph.manifold.queries.levels import Level, level_set, part
 from equimorph.model import Descriptor
 from equimorph.structures import States
+from equimorph.structures.metric import metric_length
 
 EQUAL = 2e-12
 """Part of the largest barrier that is added to differences: where symmetry makes energies equal all

@@ -19,6 +19,7 @@ from equimorph.manifold.complex.kept_tables import from_cache
 from equimorph.manifold.geometry.topology import facets_of, flags_of, pieces
 from equimorph.model import Progress, Silent
 from equimorph.structures import join_states
+from equimorph.structures.metric import metric_length
 from equimorph.tolerances import SAME_SOLUTION
 
 NOWHERE = -1
@@ -215,8 +216,8 @@ class _Edge:
             return out
         ends = join_states(structure, [landings[k].state.batch for k in landed])
         over = eset.over(**{name: ends[name] for name in eset.names})
-        gap = (over.states.z - ends.z[over.point])[:, : structure.unknowns] ** 2 @ structure.mass
-        near = np.flatnonzero(np.sqrt(gap) < SAME_SOLUTION)
+        gap = metric_length(structure, over.states.z - ends.z[over.point])
+        near = np.flatnonzero(gap < SAME_SOLUTION)
         for row in near[::-1].tolist():  # the first one counts
             out[landed[over.point[row]]] = int(over.stratum[row])
         return out

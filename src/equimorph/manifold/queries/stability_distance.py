@@ -21,6 +21,7 @@ from equimorph.manifold.queries.locate import pieces_of
 from equimorph.manifold.queries.nearest import Ground, SetPoints, local_minima, points_at_vertices
 from equimorph.manifold.queries.snap_graph import stability_boundary
 from equimorph.structures import State, States
+from equimorph.structures.metric import metric_length
 
 CANDIDATES = 12
 """Places of the boundary from which the nearest one is searched."""
@@ -179,9 +180,8 @@ def _is_beside_cusp(near: State, cusp: State) -> bool:
     structure, z, p = cusp.structure, cusp.z[None], cusp.p[None]
     at = Critical(structure, z, p, null_border(structure, z, p))
     share = np.cbrt(6.0 * np.abs(at.along(near.p[None] - p)) / np.abs(at.cubic))
-    reach, gap = ((each[:, : structure.unknowns] ** 2) @ structure.mass for each in (
-        share[:, None] * at.v, near.z[None] - z))  # fmt: skip
-    return bool(gap[0] <= APART**2 * reach[0])
+    reach = metric_length(structure, share[:, None] * at.v)
+    return bool(metric_length(structure, near.z[None] - z)[0] <= APART * reach[0])
 
 
 def _along_the_set(

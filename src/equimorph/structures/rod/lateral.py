@@ -14,10 +14,10 @@ from equimorph.arrays import Bool, Float, Int, Lanes, Parameters, Values
 from equimorph.errors import InputError
 from equimorph.linalg import Border, BorderedSolution, no_border, solve_bordered
 from equimorph.linalg.condensed import REFINABLE
-from equimorph.linalg.dense import multiply
 from equimorph.linalg.determinants import no_determinants
 from equimorph.linalg.lanes import over_lanes
 from equimorph.structures.margin import generic_vectors, inverse_step, stability_margin
+from equimorph.structures.metric import metric_length
 from equimorph.structures.rod.discretisation import Mesh
 from equimorph.structures.rod.ends import FREE, End
 from equimorph.structures.rod.lateral_kernels import lateral_lanes
@@ -257,7 +257,7 @@ class OutOfPlane:
         x = generic_vectors(self, len(z))
         for _ in range(MODE_SWEEPS):
             x = inverse_step(self, z, p, x[:, :n], shift)
-            x /= np.sqrt(multiply(x[:, :n] ** 2, self.mass))[:, None]
+            x /= metric_length(self, x)[:, None]
         half = self.mesh.integration(np.array([0.5]))[0]
         x *= np.where(x[:, 1:n:2] @ half > 0.0, -1.0, 1.0)[:, None]
         return np.asarray(x)

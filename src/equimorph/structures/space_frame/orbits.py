@@ -19,6 +19,7 @@ from equimorph.arrays import Entries, Flags, Float, Lanes, Parameters, Sides, Va
 from equimorph.linalg import BorderedSolution
 from equimorph.linalg.dense import no_border
 from equimorph.structures.equations import Advance, AnyBorder, Shift, Solver
+from equimorph.structures.metric import metric_length
 from equimorph.structures.space_frame.line_turns import NEAR_LINE, LineTurns
 from equimorph.structures.space_frame.mechanics import SpatialFrameMechanics
 from equimorph.structures.spatial.quaternions import product
@@ -64,8 +65,7 @@ class OrbitFrameMechanics(SpatialFrameMechanics):
         """Whether states may be turned about the line for nothing, and would move."""
         on = self.have_orbits(p)
         if on.any():
-            ways = self.turning(z[on], p[on])[:, : self.unknowns]
-            on[on] = ways**2 @ self.mass > OFF_LINE**2
+            on[on] = metric_length(self, self.turning(z[on], p[on])) > OFF_LINE
         return on
 
     def turning(self, z: Lanes, p: Parameters) -> Lanes:

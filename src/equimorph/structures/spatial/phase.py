@@ -23,10 +23,11 @@ import numpy as np
 
 from equimorph.arrays import Flags, Float, Lanes, Parameters, Sides, Values
 from equimorph.linalg import BorderedSolution
-from equimorph.linalg.dense import multiply, no_border
+from equimorph.linalg.dense import no_border
 from equimorph.linalg.lanes import over_lanes
 from equimorph.structures.contract import Symmetry
 from equimorph.structures.equations import Advance, AnyBorder, Direction, Shift
+from equimorph.structures.metric import metric_length
 from equimorph.structures.spatial.lagrangian import HALF_TURN
 from equimorph.structures.spatial.mechanics import SpatialMechanics, condition_tables
 from equimorph.structures.spatial.phase_condition import phase_of, phase_weight
@@ -118,14 +119,14 @@ class PinnedMechanics(SpatialMechanics):
         given = np.zeros(lanes) if shift is None else shift
         mode, value = side[:, :n] / self.mass, np.zeros(lanes)
         for number in range(INVERSE + RAYLEIGH):
-            mode /= np.sqrt(multiply(mode**2, self.mass))[:, None]
+            mode /= metric_length(self, mode)[:, None]
             side[:, :n], side[:, n:] = self.mass * mode, 0.0
             near = value - NEAR_PAIR
             yielding = self.solve(z, p, side[:, None], None, given + near).x[:, 0, :n]
             if number >= INVERSE - 1:
                 value = near + 1.0 / (side[:, :n] * yielding).sum(axis=1)
             mode = yielding
-        mode /= np.sqrt(multiply(mode**2, self.mass))[:, None]
+        mode /= metric_length(self, mode)[:, None]
         side[:, :n] = self.mass * mode
         return side, np.asarray(value < 0.0)
 

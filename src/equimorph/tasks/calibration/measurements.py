@@ -13,6 +13,7 @@ from equimorph.arrays import Float, Lanes, Parameters
 from equimorph.errors import InputError
 from equimorph.model import Descriptor
 from equimorph.structures import States, Structure
+from equimorph.structures.metric import move_length
 
 Columns = Float[np.ndarray, "lanes columns"]
 Numbers = Annotated[ArrayLike, NUMBERS]
@@ -120,9 +121,7 @@ def derivative(
     dp: Parameters,
 ) -> Columns:
     """Derivative of what is measured along directions (dz, dp), by differences of fourth order."""
-    squared = dz[:, : structure.unknowns] ** 2 @ structure.mass
-    length = np.sqrt(squared + ((dp / structure.scales) ** 2).sum(axis=1))
-    h = (STEP / np.maximum(length, 1e-300))[:, None]
+    h = (STEP / np.maximum(move_length(structure, dz, dp), 1e-300))[:, None]
     total = sum(
         weight * measurement.predict(structure, z + steps * h * dz, p + steps * h * dp)
         for steps, weight in WEIGHTS

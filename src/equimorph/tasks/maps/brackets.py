@@ -8,6 +8,7 @@ import numpy as np
 from equimorph.arrays import Bool, Edges, Float, Int, Lanes, Parameters, Settings, Shaped, Values
 from equimorph.columns import Columns
 from equimorph.structures import Structure
+from equimorph.structures.metric import metric_length
 
 RATIO = 2.0
 """Difference over an edge relative to the smaller of its neighbours' in line that is suspicious."""
@@ -49,9 +50,8 @@ def sample_distance(structure: Structure, a: Samples, b: Samples) -> Values:
 
     Zero where kinds are the same and the map shows nothing on both sides.
     """
-    n, columns = structure.unknowns, structure.scales
-    gap = np.sqrt((a.z - b.z)[:, :n] ** 2 @ structure.mass) + np.abs(a.place - b.place)
-    gap = gap + np.linalg.norm((a.p - b.p) / columns, axis=1)
+    gap = metric_length(structure, a.z - b.z) + np.abs(a.place - b.place)
+    gap = gap + np.linalg.norm((a.p - b.p) / structure.scales, axis=1)
     shown = np.isfinite(gap) & (np.isfinite(a.value) | np.isfinite(b.value))
     return np.where(a.kind != b.kind, np.inf, np.where(shown, gap, 0.0))
 

@@ -14,9 +14,9 @@ from equimorph.equilibria.critical import Critical, null_border
 from equimorph.equilibria.critical_tests import bound, branching, gap, grazing, quadratic
 from equimorph.equilibria.trace_options import EventCode, EventKind
 from equimorph.errors import InputError
-from equimorph.linalg.dense import multiply
 from equimorph.model import Constraint, Grid, Progress, Workers, position
 from equimorph.structures import Structure
+from equimorph.structures.metric import metric_length
 from equimorph.tasks.maps.actuator_map import ActuatorMap, natural_states_over, survey
 from equimorph.tasks.maps.brackets import Brackets, Samples
 from equimorph.tasks.maps.causes import Cause, Paths, Start, equal_extrema, labels
@@ -225,7 +225,7 @@ class LimitLoadRays(Paths):
         at = Critical(structure, z, p, null_border(structure, z, p))
         n = structure.unknowns
         v = np.zeros((len(vertices.kind), n))
-        v[folds] = at.v[:, :n] / np.sqrt(multiply(at.v[:, :n] ** 2, structure.mass))[:, None]
+        v[folds] = at.v[:, :n] / metric_length(structure, at.v)[:, None]
         slope = np.zeros(len(v))
         slope[folds] = branching(structure, structure.parameters[self.load].name)(at)
         a, b = edges.T

@@ -7,10 +7,10 @@ import numpy as np
 
 from equimorph.arrays import Float, Int, Lanes, Parameters, Some
 from equimorph.equilibria import Leg, Path
-from equimorph.equilibria.settle import distances
 from equimorph.manifold.lookup.exact_states import exact_states
 from equimorph.model import Constraint, Descriptor, are_feasible
 from equimorph.structures import States
+from equimorph.structures.metric import distances
 from equimorph.tasks.distances import path_lengths
 from equimorph.tasks.motion.course import EXACT, Course, correct_onto_targets
 from equimorph.tasks.route import describe_place

@@ -7,9 +7,9 @@ import numpy as np
 
 from equimorph.arrays import Float, Int
 from equimorph.equilibria import Event, EventKind, Leg, Path, lift
-from equimorph.equilibria.settle import distances
 from equimorph.model import Constraint, Descriptor, are_feasible, names_of
 from equimorph.structures import State, States
+from equimorph.structures.metric import distances
 from equimorph.tasks.distances import path_lengths, step_lengths
 from equimorph.tasks.motion.course import (
     EXACT,

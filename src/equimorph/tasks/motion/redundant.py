@@ -12,9 +12,9 @@ import numpy as np
 
 from equimorph.arrays import Float, Int
 from equimorph.equilibria import Event, EventKind
-from equimorph.equilibria.settle import distances
 from equimorph.model import Constraint
 from equimorph.structures import State, join_states
+from equimorph.structures.metric import distances
 from equimorph.tasks.motion.blocks import Stretch
 from equimorph.tasks.motion.course import (
     Course,

@@ -16,6 +16,7 @@ from equimorph.manifold import EquilibriumSet, StatesOver
 from equimorph.manifold.queries.locate import pieces_of
 from equimorph.model import Constraint, Descriptor, Grid, worst_relative_excess
 from equimorph.structures import State, States
+from equimorph.structures.metric import metric_length
 from equimorph.tasks.maps.actuator_map import settings_of
 from equimorph.tasks.maps.brackets import grid_edges
 from equimorph.tolerances import SAME_SOLUTION
@@ -186,10 +187,10 @@ def _barriers(
     pairs = grid_edges(place.shape)
     pairs = pairs[(place.ravel()[pairs] >= 0).all(axis=1)]
     ends = place.ravel()[pairs]
-    structure, n = states.structure, states.structure.unknowns
+    structure = states.structure
     a, b = states[ends[:, 0]], states[ends[:, 1]]
     arrived, z = _lift_straight(a, b)
-    gap = np.sqrt((z - b.z)[:, :n] ** 2 @ structure.mass)
+    gap = metric_length(structure, z - b.z)
     apart = np.flatnonzero(~(arrived & (gap < SAME_SOLUTION)))
     back, _ = _lift_straight(b[apart], a[apart])
     kind: tuple[BarrierKind, ...] = tuple(

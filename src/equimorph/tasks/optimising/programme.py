@@ -13,6 +13,7 @@ from equimorph.manifold.queries.nearest import SetPoints
 from equimorph.model import Constraint, Descriptor
 from equimorph.structures import Structure, margin_of, value_of
 from equimorph.structures.margin import generic_vectors, inverse_step
+from equimorph.structures.metric import metric_length
 from equimorph.tasks.optimising.quadratic import QuadraticStep
 from equimorph.tasks.optimising.tangent_steps import (
     project_onto_set,
@@ -98,9 +99,9 @@ def nearest_eigenvalue(structure: Structure, z: Lanes, p: Parameters) -> Values:
     shift, value = np.full(len(z), SHIFT), np.zeros(len(z))
     for _ in range(SWEEPS):
         x = inverse_step(structure, z, p, v, shift)[:, :n]
-        size = x**2 @ mass
-        value = SHIFT + np.einsum("li,i,li->l", x, mass, v) / size
-        v = x / np.sqrt(size)[:, None]
+        size = metric_length(structure, x)
+        value = SHIFT + np.einsum("li,i,li->l", x, mass, v) / size**2
+        v = x / size[:, None]
     return value
 
 

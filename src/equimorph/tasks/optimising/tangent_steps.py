@@ -13,6 +13,7 @@ from equimorph.manifold.geometry.setting import Setting, embed
 from equimorph.manifold.geometry.tangents import frames_in_embedding, split_step, tangent_frames
 from equimorph.manifold.queries.nearest import FAR, SetPoints
 from equimorph.structures import State, States
+from equimorph.structures.metric import metric_coordinates
 
 Steps = Float[np.ndarray, "lanes d"]
 
@@ -21,7 +22,7 @@ def tangent_planes(setting: Setting, states: States) -> Rows:
     """Planes near the tangent spaces of stable states."""
     structure, free = setting.structure, setting.free
     dz, dp = answers(structure, states.z, states.p, free)
-    u = dz[:, :, : structure.unknowns] * np.sqrt(structure.mass)
+    u = metric_coordinates(structure, dz)
     both = np.concatenate([u, dp[:, :, free] / structure.scales[free]], axis=2)
     return np.ascontiguousarray(np.swapaxes(np.linalg.qr(np.swapaxes(both, 1, 2))[0], 1, 2))
 

@@ -7,10 +7,10 @@ from itertools import islice
 import numpy as np
 
 from equimorph.arrays import Lanes, Parameters, Values
-from equimorph.equilibria.soft_modes import metric_length
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Constraint, Descriptor, ease
 from equimorph.structures import States, join_states, stability_margin
+from equimorph.structures.metric import metric_length
 from equimorph.tasks.optimising.programme import Objective
 from equimorph.tasks.planning.bottlenecks import Passing, find_bottleneck
 from equimorph.tasks.planning.filtration import Filtration
@@ -129,9 +129,7 @@ def _link_over(passing: Passing, demands: Demands) -> States | None:
     if over is None or len(over) <= SHORTEST:
         return over
     linked, _ = connect(over[:-1], over[1:], demands)
-    gap = metric_length(
-        over.structure, (over.z - passing.bottleneck.state.z)[:, : over.structure.unknowns]
-    )
+    gap = metric_length(over.structure, over.z - passing.bottleneck.state.z)
     middle, broken = int(gap.argmin()), np.flatnonzero(~linked)
     start = int(broken[broken < middle].max(initial=-1)) + 1
     end = int(broken[broken >= middle].min(initial=len(linked)))

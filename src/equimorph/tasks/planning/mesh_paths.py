@@ -9,10 +9,10 @@ from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import cKDTree
 
 from equimorph.arrays import Float, Int, Values
-from equimorph.equilibria.newton_step import metric_places
 from equimorph.linalg.graphs import graph_of, walk_back
 from equimorph.manifold import EquilibriumSet
 from equimorph.structures import States
+from equimorph.structures.metric import metric_places
 from equimorph.tasks.planning.network import (
     Demands,
     Ends,

@@ -7,7 +7,6 @@ import numpy as np
 
 from equimorph.arrays import Bool, Flags, Float, Int, Lanes, Parameters, Some, Values
 from equimorph.equilibria import ParameterLine, TraceOptions
-from equimorph.equilibria.soft_modes import metric_length
 from equimorph.equilibria.trace import Traces, trace
 from equimorph.equilibria.trace_options import EventCode
 from equimorph.linalg.graphs import components
@@ -17,6 +16,7 @@ from equimorph.manifold.geometry.topology import faces_of
 from equimorph.model import Constraint, are_feasible, ease
 from equimorph.structures import State, States, Structure, join_states
 from equimorph.structures.margin import count_below
+from equimorph.structures.metric import metric_length
 from equimorph.tasks.planning.objectives import ROUGH, Objective, Wish, objective_of
 from equimorph.tasks.route import FINE
 
@@ -95,9 +95,7 @@ class Demands:
 def connect(source: States, target: States, demands: Demands) -> tuple[Flags, Values]:
     """Whether straight lifts lead from states to states, admissible all the way; their costs."""
     z, linked, cost = lift_straight(source, target.p, demands)
-    linked &= (
-        metric_length(source.structure, (z - target.z)[:, : source.structure.unknowns]) < MATCH
-    )
+    linked &= metric_length(source.structure, z - target.z) < MATCH
     return linked, cost
 
 

@@ -12,9 +12,9 @@ from equimorph.argument_kinds import ANYTHING, short
 from equimorph.arrays import Flags, Float, Int
 from equimorph.equilibria import settle
 from equimorph.errors import InputError, suggestion
-from equimorph.linalg.dense import multiply
 from equimorph.model import Constraint, Descriptor, Rates, Schedule, names_of
 from equimorph.structures import States, Structure, stability_margin
+from equimorph.structures.metric import move_length
 
 Values = Float[np.ndarray, " pairs"]
 Numbers = Int[np.ndarray, " pairs"]
@@ -339,12 +339,9 @@ def _cost(term: Term, first: Places, second: Places) -> Values:
     if term == "work":
         mean = 0.5 * (first.efforts + second.efforts)
         return np.asarray(np.abs(mean * dp).sum(axis=1))
-    travel = ((dp / structure.scales) ** 2).sum(axis=1)
     if term == "travel":
-        return np.asarray(np.sqrt(travel))
-    n = structure.unknowns
-    dz = second.states.z[:, :n] - first.states.z[:, :n]
-    return np.asarray(np.sqrt(multiply(dz**2, structure.mass) + travel))
+        return np.asarray(np.sqrt(((dp / structure.scales) ** 2).sum(axis=1)))
+    return move_length(structure, second.states.z - first.states.z, dp)
 
 
 def _times(rates: Rates, names: Sequence[str], dp: Float[np.ndarray, "pairs params"]) -> Values:

@@ -14,12 +14,12 @@ import numpy as np
 
 from equimorph.argument_checks import check_arguments
 from equimorph.equilibria import way_points
-from equimorph.equilibria.soft_modes import metric_length
 from equimorph.errors import InputError
 from equimorph.linalg.graphs import components
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Constraint, Descriptor, ease
 from equimorph.structures import State, margin_of
+from equimorph.structures.metric import metric_length
 from equimorph.tasks.planning.bottlenecks import Passing, find_bottleneck
 from equimorph.tasks.planning.free_routes import (
     free_route,
@@ -370,6 +370,6 @@ def _nearest(eset: EquilibriumSet, ends: Ends, demands: Demands) -> State | None
     if len(some) == 0:
         return None
     states, structure = nodes_with_ends(eset, ends)[some], eset.structure
-    gap = metric_length(structure, (states.z - ends[1].z)[:, : structure.unknowns])
+    gap = metric_length(structure, states.z - ends[1].z)
     gap = np.hypot(gap, np.linalg.norm((states.p - ends[1].p) / structure.scales, axis=1))
     return states[int(gap.argmin())]

@@ -8,6 +8,7 @@ from equimorph.arrays import Float, Int, Lanes, Parameters, Values
 from equimorph.equilibria.sensitivity import slopes_along, tangents
 from equimorph.model import Box, Constraint
 from equimorph.structures import State, States
+from equimorph.structures.metric import metric_coordinates
 
 Numbers = Int[np.ndarray, " lanes"]
 
@@ -113,12 +114,11 @@ class Tree:
         self, course: LoadCourse, other: "Tree", new: Numbers, count: int
     ) -> tuple[Numbers, Numbers]:
         """Pairs of new nodes of another tree and the nearest nodes of this one on the same leg."""
-        s, n = other.s[new], self.structure.unknowns
+        s = other.s[new]
         ahead = other.sense * (self.s - s[:, None])
         leg = np.floor(np.minimum(self.s, s[:, None])) + 1.0
         fits = (ahead >= 0.0) & (np.maximum(self.s, s[:, None]) <= leg)
-        root = np.sqrt(self.structure.mass)
-        one, two = other.z[new][:, :n] * root, self.z[:, :n] * root
+        one, two = (metric_coordinates(self.structure, z) for z in (other.z[new], self.z))
         square = (one**2).sum(1)[:, None] + (two**2).sum(1) - 2.0 * one @ two.T
         square += course.gaps(other.p[new][:, course.free], self.p)
         square = np.where(fits, square, np.inf)

@@ -15,12 +15,12 @@ from itertools import combinations, pairwise
 import numpy as np
 
 from equimorph.arrays import Pairs
-from equimorph.equilibria.settle import distances
 from equimorph.linalg.graphs import components, shortest_path
 from equimorph.manifold import EquilibriumSet, equilibrium_set
 from equimorph.manifold.queries.locate import pieces_of
 from equimorph.model import Box, Constraint
 from equimorph.structures import State, States, join_states
+from equimorph.structures.metric import distances
 from equimorph.tasks.planning.mesh_paths import cheapest_path
 from equimorph.tasks.planning.network import (
     MATCH,

@@ -9,11 +9,10 @@ from itertools import pairwise
 import numpy as np
 
 from equimorph.arrays import Flags, Parameters, Values
-from equimorph.equilibria.newton_step import metric_places
-from equimorph.equilibria.soft_modes import metric_length
 from equimorph.manifold import EquilibriumSet, Snap
 from equimorph.manifold.queries.nearest import Ground, SetPoints, points_at_vertices
 from equimorph.structures import State, States, join_states
+from equimorph.structures.metric import metric_length, metric_places
 from equimorph.tasks.planning.network import MATCH, Demands, lift_straight
 from equimorph.tolerances import SAME_STATE
 
@@ -176,9 +175,7 @@ def _last_steps(approach: States, folds: States, demands: Demands) -> Values:
 
 
 def _near(states: States, others: States, within: float) -> Flags:
-    n = states.structure.unknowns
-    gap = metric_length(states.structure, (states.z - others.z)[:, :n])
-    return np.asarray(gap < within)
+    return np.asarray(metric_length(states.structure, states.z - others.z) < within)
 
 
 def _beyond(eset: EquilibriumSet, before: Parameters, folds: Parameters) -> Parameters:

@@ -22,6 +22,7 @@ from equimorph.manifold.lookup.cell_index import CellIndex, Hits
 from equimorph.manifold.queries.nearest import SetPoints, local_minima, points_at_vertices
 from equimorph.model import Constraint, Descriptor, function_of
 from equimorph.structures import States, join_states
+from equimorph.structures.metric import metric_coordinates
 from equimorph.tasks.optimising.programme import Objective, Programme
 from equimorph.tasks.optimising.sqp import descend
 from equimorph.tasks.optimising.tangent_steps import unconstrained_setting
@@ -144,10 +145,11 @@ class Predictor:
         Nor to a known state from this side.
         """
         corners, structure = self.eset.cells[hits.cell], self.setting.structure
-        n, free = structure.unknowns, self.setting.free
-        u = np.einsum("ck,cki->ci", hits.weights, self.eset.points.z[corners, :n])
+        free = self.setting.free
+        z = np.einsum("ck,cki->ci", hits.weights, self.eset.points.z[corners])
         p = np.einsum("ck,cki->ci", hits.weights, self.eset.points.p[corners][:, :, free])
-        place = np.concatenate([u * np.sqrt(structure.mass), p / self.setting.scales], axis=1)
+        u = metric_coordinates(structure, z)
+        place = np.concatenate([u, p / self.setting.scales], axis=1)
         reach, side = CLOSE * self._sizes[hits.cell], self._sides[hits.cell]
         rows = np.arange(hits.point.max(initial=-1) + 2)
         before, there, beside = np.zeros(len(rows), int), place[:0], side[:0]

@@ -22,6 +22,7 @@ from equimorph.equilibria import (
 from equimorph.errors import InputError
 from equimorph.model import Constraint, Descriptor, Schedule, names_of
 from equimorph.structures import State, States, Structure, from_identity, join_states
+from equimorph.structures.metric import metric_length
 from equimorph.tasks.distances import path_lengths
 from equimorph.tasks.route import FINE, describe_obstacle, describe_place, schedule_of
 from equimorph.tasks.start import check_schedule, inadmissible
@@ -95,8 +96,8 @@ def _lift(states: States, to: Rows, within: tuple[Constraint, ...], options: Tra
 
 def _true(lifts: Lifts, goals: States) -> int:
     """Number of legs, from the first on, whose lifts arrive at the goal."""
-    gap = (lifts.states.z - goals.z)[:, : goals.structure.unknowns] ** 2 @ goals.structure.mass
-    bad = np.flatnonzero(~_there(lifts) | (np.sqrt(gap) > SAME_STATE))
+    gap = metric_length(goals.structure, lifts.states.z - goals.z)
+    bad = np.flatnonzero(~_there(lifts) | (gap > SAME_STATE))
     return int(bad[0]) if len(bad) else len(goals)
 
 
@@ -318,8 +319,7 @@ def first_state(schedule: Schedule, structure: Structure | None) -> State:
     if state.residual < 1e-10:
         return state
     near = settle(owner, z[None], state.p[None])
-    gap = float(np.sqrt((near.z[0] - z)[: owner.unknowns] ** 2 @ owner.mass))
-    if not (near.found[0] and gap <= NEAR):
+    if not (near.found[0] and metric_length(owner, near.z[0] - z) <= NEAR):
         raise InputError(
             f"`schedule` must start at an equilibrium; got a residual of {state.residual:.2g}."
         )

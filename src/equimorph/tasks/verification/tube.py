@@ -16,11 +16,11 @@ import numpy as np
 from equimorph.arrays import Flags, Float, Int, Items, Lanes, Pairs, Parameters
 from equimorph.columns import Columns
 from equimorph.equilibria import Event, ParameterLine, TraceOptions, settle, trace
-from equimorph.equilibria.soft_modes import metric_length
 from equimorph.equilibria.trace_options import EventCode
 from equimorph.manifold.geometry.topology import runs
 from equimorph.model import Constraint, worst_relative_excess
 from equimorph.structures import State, States, Structure
+from equimorph.structures.metric import metric_length
 from equimorph.tasks.verification.error_box import Deviation, ErrorBox
 from equimorph.tasks.verification.evidence import (
     ProofStatus,
@@ -300,7 +300,7 @@ class Tube:
         along = 0.5 * (cells.after - cells.before), 0.5 * (cells.end - cells.start)
         turns = np.concatenate([along[0][:, None], judged.responses.mean(axis=1)], axis=1)
         steps = np.concatenate([along[1][:, None], self._errors(cells).steps], axis=1)
-        moves = np.asarray(turns[:, :, : structure.unknowns] ** 2 @ structure.mass)
+        moves = metric_length(structure, turns) ** 2
         widths = ((steps / structure.scales) ** 2).sum(axis=2)
         moves[:, : widths.shape[1]] += LEAST_SHARE * widths
         return moves
@@ -331,16 +331,16 @@ class Tube:
 def _meet_on_two_sheets(structure: Structure, halves: Cells, axis: Items) -> bool:
     """Whether halves of a segment, each followed from its own end, differ where they meet."""
     count = len(axis)
-    gap = (halves.after[:count] - halves.before[count:])[:, : structure.unknowns]
-    return bool((metric_length(structure, gap)[axis == 0] > SAME_SOLUTION).any())
+    gap = metric_length(structure, halves.after[:count] - halves.before[count:])
+    return bool((gap[axis == 0] > SAME_SOLUTION).any())
 
 
 def _move(origin: States, guess: Lanes, p: Parameters) -> tuple[Lanes, Event | None]:
     """Stable states near guesses, lifted where these are bad; or what such a lift met."""
-    structure, n = origin.structure, origin.structure.unknowns
+    structure = origin.structure
     near = settle(structure, guess, p)
-    away = metric_length(structure, (near.z - guess)[:, :n])
-    way = metric_length(structure, (guess - origin.z)[:, :n])
+    away = metric_length(structure, near.z - guess)
+    way = metric_length(structure, guess - origin.z)
     z, good = near.z, near.found & (away <= LARGEST_SAGITTA * way + 1e-12)
     good[good] = structure.index(z[good], p[good]) == 0
     far = np.flatnonzero(~good)

@@ -13,10 +13,10 @@ from equimorph.arrays import Float, Items, Place, Values
 from equimorph.equilibria import EventKind, Lifts, TraceOptions, lift
 from equimorph.equilibria.descents import Descents, descend
 from equimorph.equilibria.gradient_flow import FAITHFUL, Ending
-from equimorph.equilibria.soft_modes import metric_length
 from equimorph.errors import InputError
 from equimorph.model import Constraint, position, worst_excess
 from equimorph.structures import State, States, join_states
+from equimorph.structures.metric import metric_length
 from equimorph.tasks.words.word_graph import MoveKind, WordGraph, WordMove, check_letters, words_of
 from equimorph.tolerances import SAME_PLACE, SAME_SOLUTION
 
@@ -222,7 +222,7 @@ class _Exploration:
         structure = self.stops.structure
         same = (np.abs((self.stops.p - p) / structure.scales) <= SAME_PLACE).all(axis=1)
         own = np.flatnonzero(same)
-        gap = metric_length(structure, (self.stops.z[own] - z)[:, : structure.unknowns])
+        gap = metric_length(structure, self.stops.z[own] - z)
         if gap.min(initial=np.inf) <= SAME_SOLUTION:
             return int(own[gap.argmin()])
         self.stops = join_states(structure, [self.stops, State(structure, z, p)])
