@@ -228,6 +228,26 @@ def test_surfaces_are_dissected_along_their_folds():
     assert [len(each.states) for each in curve.transitions] == [1]
 
 
+@pytest.mark.parametrize("seed", [0, 3, 22, 32, 34, 38, 42, 75])
+def test_cuts_begin_at_the_cusp_wherever_the_grid_lies(seed):
+    """Closed form: x³ + a x + b has its cusp at a = b = 0. In some boxes a vertex lies there."""
+    draw = np.random.default_rng(seed)
+    half, *ends = draw.uniform([0.3, -2.5, 0.2], [3.0, -0.3, 1.5])
+    intervals = tuple(draw.integers(4, 14, 2).tolist())
+    box = em.Box(a=tuple(ends), b=(-half * draw.uniform(0.4, 1.0), half))
+    with unchecked():
+        atlas = em.dissect(lifted(cusp(), box, intervals))
+    assert len(atlas) == 3
+    assert all(chart.single_valued for chart in atlas.charts)
+    assert sorted(each.kind for each in atlas.transitions) == ["cut", "fold", "fold"]
+    for each in atlas.transitions:
+        gap = np.abs(each.coords[0][[0, -1]]).max(axis=1)
+        assert gap.min() < 1e-9
+    place = atlas.eset.coordinates[atlas.eset.cells]
+    areas = np.abs(np.linalg.det(np.diff(place, axis=1)))
+    assert areas.min() > 1e-9 * np.median(areas)
+
+
 @pytest.mark.slow
 def test_bodies_are_dissected_along_their_folds():
     """Swallowtail: charts that do not overlap."""
@@ -236,7 +256,7 @@ def test_bodies_are_dissected_along_their_folds():
         body = em.dissect(lifted(swallowtail(), box, (3, 3, 3)))
         for chart in body.charts:
             cells = Cells(body.eset, coordinates_of(body.eset, ("a", "b", "c")), chart.numbers)
-            assert len(overlapping(cells)) == 0
+            assert len(overlapping(cells, np.zeros(0, int))) == 0
 
 
 def test_empty_sets_are_not_dissected(spring_set):

@@ -7,7 +7,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import breadth_first_order, dijkstra, maximum_flow
 from scipy.spatial import cKDTree
 
-from equimorph.arrays import Bool, Float, Int, Pairs
+from equimorph.arrays import Bool, Float, Int, Pairs, VertexNumbers
 from equimorph.charts.kernels import overlap_flags
 from equimorph.charts.location import Cells
 from equimorph.linalg.graphs import graph_of
@@ -37,10 +37,10 @@ class Conflicts:
         return bool((self.colour >= 0).any())
 
 
-def conflicts_of(cells: Cells) -> Conflicts:
+def conflicts_of(cells: Cells, cusps: VertexNumbers) -> Conflicts:
     """Colours of cells that lie over other cells, as few as a greedy choice finds."""
     count = len(cells.numbers)
-    pairs = overlapping(cells)
+    pairs = overlapping(cells, cusps)
     colour = np.full(count, -1)
     if len(pairs) == 0:
         return Conflicts(colour)
@@ -52,11 +52,11 @@ def conflicts_of(cells: Cells) -> Conflicts:
     return Conflicts(np.where(inside, _colour_groups(group, pairs)[group], -1))
 
 
-def overlapping(cells: Cells) -> Pairs:
-    """Pairs of cells without a common vertex that lie over each other.
+def overlapping(cells: Cells, cusps: VertexNumbers) -> Pairs:
+    """Pairs of cells without a common vertex, but perhaps a cusp, that lie over each other.
 
-    Over two parameters by separating axes, over three where one holds the middle of the other. At a
-    cusp neighbours lie over each other: the cells around them separate the sheets. Cells turned
+    Over two parameters by separating axes, over three where one holds the middle of the other. A
+    sheet goes all the way round its cusp, and its cells on both folds there overlap. Cells turned
     over by chords of curved folds cover nothing.
     """
     values = cells.values[cells.corners]
@@ -69,7 +69,10 @@ def overlapping(cells: Cells) -> Pairs:
         hits = CellIndex.of(corners, np.zeros(len(corners))).near(corners.mean(axis=1))
         pairs = np.stack([hits.point[hits.inside], hits.cell[hits.inside]], axis=1)
         inward = np.zeros((0, 0, 2))
-    overlap = overlap_flags(pairs, vertices, corners, inward, TOUCHING)
+    # cells that have a cusp in common have no other vertex, or they are neighbours
+    at_cusp = np.isin(vertices, cusps)
+    own = -1 - np.arange(len(vertices))[:, None]
+    overlap = overlap_flags(pairs, np.where(at_cusp, own, vertices), corners, inward, TOUCHING)
     return np.asarray(plain[pairs[overlap]])
 
 

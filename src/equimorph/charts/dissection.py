@@ -6,27 +6,20 @@ from itertools import pairwise
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
-from equimorph.arrays import Bool, CellNumbers, Int, ItemValues, Pairs
+from equimorph.arrays import Bool, CellNumbers, Int, ItemValues, Pairs, VertexNumbers
 from equimorph.charts.atlas import Atlas
 from equimorph.charts.conflicts import conflicts_of, least_cut
 from equimorph.charts.coordinates import Coordinates, coordinates_of
 from equimorph.charts.location import Cells
 from equimorph.charts.paths import Ground, Walker, Way, straightest_path
-from equimorph.charts.preparation import (
-    add_cusp_vertices,
-    cut_along_crossings,
-    flip_inverted_triangles,
-)
+from equimorph.charts.preparation import cut_along_crossings, with_cusp_vertices
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.complex.equilibrium_set import check_cells
 from equimorph.manifold.complex.excerpts import Excerpt, excerpt_of
 from equimorph.manifold.complex.marked_complex import Fabric
 from equimorph.manifold.complex.vertices import Vertices, free_vertices
 from equimorph.manifold.geometry.exact_points import Corrected
-from equimorph.manifold.geometry.points import on_fold
-from equimorph.manifold.geometry.simplices import squared_sides
 from equimorph.manifold.geometry.topology import (
-    adjacency,
     chains,
     count_corners,
     flags_of,
@@ -38,8 +31,6 @@ from equimorph.manifold.queries.levels import whole_set
 from equimorph.structures import States
 from equimorph.tolerances import SAME_NUMBER
 
-RINGS = 3
-"""Rings of cells around the end of a cut in which a cusp is its true end."""
 MOST = 40
 """Largest number of cuts; overlaps that remain are listed by `Atlas`."""
 
@@ -68,10 +59,9 @@ def dissect(eset: EquilibriumSet) -> Atlas:
         If the set is empty.
     """
     check_cells(eset)
-    eset = cut_along_crossings(eset)
-    work = _Work.of(eset)
+    eset, cusps = with_cusp_vertices(cut_along_crossings(eset))
+    work = _Work.of(eset, cusps)
     if len(eset.names) > 1:
-        work = work.insert_cusps()
         open_ = list(range(len(eset.strata)))
         for _ in range(MOST):
             if not open_:
@@ -101,17 +91,17 @@ class _Work:
     """Its cells, cut; ``fabric.cell_index`` is the number of their chart."""
     origin: Int[np.ndarray, " charts"]
     """Stratum of each chart."""
-    cusps: tuple[int, ...] = ()
+    cusps: VertexNumbers
     """Vertices at cusps."""
 
     @classmethod
-    def of(cls, eset: EquilibriumSet) -> "_Work":
+    def of(cls, eset: EquilibriumSet, cusps: VertexNumbers) -> "_Work":
         """Nothing is cut: charts are strata."""
-        folded = on_fold(eset.kinds)  # where frames find cusps
-        excerpt = excerpt_of(eset, np.ones(len(eset.cells), bool), folded)
+        every = np.ones(len(eset.cells), bool)
+        excerpt = excerpt_of(eset, every, np.zeros(len(eset.points), bool))
         number = np.arange(len(eset.strata))
         fabric = replace(excerpt.fabric, cell_index=eset.stratum.copy())
-        return cls(excerpt, fabric, number)
+        return cls(excerpt, fabric, number, np.searchsorted(excerpt.used, cusps))
 
     @property
     def eset(self) -> EquilibriumSet:
@@ -143,7 +133,7 @@ class _Work:
     def cut_chart(self, chart: int) -> tuple["_Work", list[int]]:
         """The same with a chart cut once, and the charts to look at again."""
         cells, own = self.cells(chart)
-        colour = conflicts_of(cells).colour
+        colour = conflicts_of(cells, self.cusps).colour
         if not (colour >= 0).any():
             return self, []
         side = least_cut(cells, colour == 0, colour > 0)
@@ -160,25 +150,6 @@ class _Work:
         origin = np.concatenate([self.origin, np.full(max(more, 0), self.origin[chart])])
         return replace(self, fabric=replace(self.fabric, cell_index=label), origin=origin)
 
-    def insert_cusps(self) -> "_Work":
-        """The same with vertices at the cusps, where sheets part that a cut has to part."""
-        if self.fabric.dimension != 2:
-            return self
-        fabric, cusps = add_cusp_vertices(self.excerpt, self.fabric)
-        if len(cusps) == 0:
-            return self
-        return replace(self, fabric=fabric, cusps=tuple(cusps.tolist()))._untangle()
-
-    def _untangle(self) -> "_Work":
-        """The same with fewer triangles that chords of curved folds have turned over."""
-        fabric = self.fabric
-        places = fabric.vertices.p[:, fabric.setting.free]
-        corners = flip_inverted_triangles(
-            fabric.cells, places, fabric.facets, fabric.cell_index, adjacency(fabric.cells)
-        )
-        squared = squared_sides(fabric.vertices.place, corners)
-        return replace(self, fabric=replace(fabric, cells=corners, squared=squared))
-
     def _straight(
         self,
         chart: int,
@@ -192,10 +163,7 @@ class _Work:
         places = cells.values / cells.coordinates.setting.scales
         ground = Ground(cells.corners, places, cells.whole)
         clear, free = Walker(ground, alone), Walker(ground, np.ones_like(alone))
-        ways = []
-        for path in _paths(cells, side):
-            drawn = _snap_to_cusps(clear, free, cells, path, self.cusps)
-            ways.append(straightest_path(clear, free, drawn))
+        ways = [straightest_path(clear, free, path) for path in _paths(cells, side)]
         cut = _insert_crossings(self.fabric, ways)
         if cut is None:
             return None
@@ -218,40 +186,6 @@ def _paths(cells: Cells, side: Bool[np.ndarray, " own"]) -> list[list[int]]:
     whole = cells.whole
     a, b = whole.links.T
     return [chain.tolist() for chain in chains(whole.facets[whole.across[side[a] != side[b]]])]
-
-
-def _snap_to_cusps(
-    clear: Walker, free: Walker, cells: Cells, path: list[int], cusps: tuple[int, ...]
-) -> list[int]:
-    """The path, with its ends moved to cusps next to them."""
-    out = list(path)
-    if path[0] == path[-1]:
-        return out
-    for _ in range(2):
-        out = _start_at_cusp(clear, free, cells, out, cusps)[::-1]
-    return out
-
-
-def _start_at_cusp(
-    clear: Walker, free: Walker, cells: Cells, path: list[int], cusps: tuple[int, ...]
-) -> list[int]:
-    """The path from the cusp next to its beginning on, if it sees one of its first vertices."""
-    if not cusps or path[0] in cusps:
-        return path
-    place, corners = clear.ground.places, cells.corners
-    around = np.arange(len(place)) == path[0]
-    for _ in range(RINGS):
-        around[corners[around[corners].any(axis=1)]] = True
-    near = [cusp for cusp in cusps if around[cusp]]
-    if not near:
-        return path
-    cusp = min(near, key=lambda c: float(np.linalg.norm(place[c] - place[path[0]])))
-    # next to a cusp all cells lie over other cells
-    for walker in (clear, free):
-        for k, vertex in enumerate(path[: len(path) // 2 + 1]):
-            if vertex != cusp and walker.way(cusp, vertex) is not None:
-                return [cusp, *path[k:]]
-    return path
 
 
 def _insert_crossings(fabric: Fabric, ways: list[Way]) -> tuple[Fabric, Pairs] | None:

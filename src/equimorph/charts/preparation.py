@@ -19,10 +19,8 @@ from equimorph.arrays import (
     VertexNumbers,
 )
 from equimorph.manifold import EquilibriumSet
-from equimorph.manifold.complex.excerpts import Excerpt, excerpt_of
-from equimorph.manifold.complex.kept_tables import from_cache, kept
-from equimorph.manifold.complex.marked_complex import Fabric
-from equimorph.manifold.complex.vertices import Vertices
+from equimorph.manifold.complex.excerpts import excerpt_of
+from equimorph.manifold.complex.kept_tables import kept
 from equimorph.manifold.geometry.points import VertexKind, on_fold
 from equimorph.manifold.geometry.simplices import volumes
 from equimorph.manifold.geometry.tangents import fold_forms
@@ -38,7 +36,7 @@ from equimorph.manifold.geometry.topology import (
     pieces,
     runs,
 )
-from equimorph.manifold.queries.cusps import cusps_on_edges
+from equimorph.manifold.queries.cusps import cusps_of
 from equimorph.manifold.queries.levels import whole_set
 
 ROUNDS = 6
@@ -98,52 +96,38 @@ def on_box(eset: EquilibriumSet, facets: Facets) -> ItemFlags:
     return out
 
 
-def add_cusp_vertices(excerpt: Excerpt, fabric: Fabric) -> tuple[Fabric, Int[np.ndarray, " cusps"]]:
-    """An excerpt over two parameters with vertices at its cusps, and which of them these are.
+def with_cusp_vertices(eset: EquilibriumSet) -> tuple[EquilibriumSet, VertexNumbers]:
+    """A set over two parameters with vertices at its cusps, and which of them these are.
 
-    `fabric`: what was made of its cells; all of its vertices are those of the excerpt.
+    Without cusps, or over other parameters, it is the set itself.
     """
-    count, used = len(fabric.vertices), excerpt.used
-
-    def cusps() -> tuple[Pairs, Vertices]:
-        ends, found = cusps_on_edges(excerpt.fabric)
-        return used[ends], found
-
-    ends, found = from_cache(excerpt.eset, "cusps", cusps)
-    if len(ends):
-        fabric = fabric.bisect(np.searchsorted(used, ends), found)
-    return fabric, np.arange(count, len(fabric.vertices))
-
-
-def with_cusp_vertices(eset: EquilibriumSet) -> EquilibriumSet:
-    """A set with vertices at its cusps; the set itself if it has none."""
     made = _with_cusps(eset) if len(eset.names) == 2 else None
-    return eset if made is None else made
+    return made or (eset, np.zeros(0, int))
 
 
 @kept
-def _with_cusps(eset: EquilibriumSet) -> EquilibriumSet | None:
+def _with_cusps(eset: EquilibriumSet) -> tuple[EquilibriumSet, VertexNumbers] | None:
     folded = on_fold(eset.kinds)
     excerpt = excerpt_of(eset, count_corners(folded, eset.cells) >= len(eset.names), folded)
-    fabric, cusps = add_cusp_vertices(excerpt, excerpt.fabric)
-    if len(cusps) == 0:
+    met, ends, found = cusps_of(excerpt.fabric)
+    if len(met) + len(found) == 0:
         return None
+    recut = excerpt.put_back(excerpt.fabric.bisect(ends, found))
+    whole = whole_set(recut)
+    new = len(recut.points) - len(found) + np.arange(len(found))
+    cusps = recut.numbers[np.append(excerpt.used[met], new)]
     # straight sides of cells at a cusp may pass it on its wrong side
-    whole = whole_set(excerpt.put_back(fabric))
     fixed = facets_of((*whole.folds, *whole.crossings), 2)
-    ground = _Ground(whole.coordinates, on_fold(whole.kinds), _existence(whole, len(cusps)))
+    ground = _Ground(whole.coordinates, on_fold(whole.kinds), _existence(whole, cusps))
     cells = _flip(whole.cells, ground, fixed, whole.stratum, whole.adjacency)
-    return replace(whole, cells=cells)
+    return replace(whole, cells=cells), cusps
 
 
-def _existence(eset: EquilibriumSet, cusps: int) -> Float[np.ndarray, "V 2"]:
-    """Vectors at vertices on folds towards where states exist; none elsewhere.
-
-    The last vertices are cusps, and have none.
-    """
+def _existence(eset: EquilibriumSet, cusps: Some) -> Float[np.ndarray, "V 2"]:
+    """Vectors at vertices on folds towards where states exist; none elsewhere, nor at cusps."""
     out = np.zeros((len(eset.points), len(eset.names)))
     own = on_fold(eset.kinds)
-    own[len(own) - cusps :] = False
+    own[cusps] = False
     forms = fold_forms(eset.setting, eset.points.z[own], eset.points.p[own])
     out[own] = forms.existence / eset.setting.scales
     return out

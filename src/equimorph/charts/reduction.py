@@ -182,7 +182,7 @@ def reduce(
         state at all.
     """
     check_cells(eset)
-    eset = with_cusp_vertices(cut_along_crossings(eset))
+    eset, _ = with_cusp_vertices(cut_along_crossings(eset))
     rule = rule_of(prefer)
     among = np.flatnonzero((eset.cell_index == 0) | (not stable))
     if len(among) == 0:

@@ -5,7 +5,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
-from equimorph.arrays import CellFlags, Float, Int, Items, ItemValues, Pairs, VertexFlags
+from equimorph.arrays import (
+    CellFlags,
+    Float,
+    Int,
+    Items,
+    ItemValues,
+    Pairs,
+    Some,
+    VertexFlags,
+)
 from equimorph.equilibria.critical import null_vectors
 from equimorph.equilibria.locus import Locus, nearest
 from equimorph.equilibria.settle import lower_index
@@ -23,7 +32,7 @@ from equimorph.tolerances import SAME_STATE
 REACH = 1.5
 """Largest distance of a cusp from the ends of the edge near which it is sought, in its lengths."""
 CLOSE = 1e-3
-"""Shares of an edge next to its ends in which a cusp is that of the end."""
+"""Share of an edge next to its ends in which a cusp is that of the end."""
 
 
 @dataclass(frozen=True)
@@ -79,16 +88,27 @@ def cusps(eset: EquilibriumSet) -> Cusps:
 def _turning_hubs(fabric: Fabric, ends: Pairs) -> Int[np.ndarray, " m"]:
     """Vertices at which the image of a fold turns back as it passes a crossing."""
     store = fabric.vertices
-    both = np.concatenate([ends, ends[:, ::-1]])
-    both = both[store.kinds[both[:, 0]] == VertexKind.CROSSING]
-    point = fabric.points[both[:, 0]]
-    order = np.argsort(point, kind="stable")
-    _, first, counts = np.unique(point[order], return_index=True, return_counts=True)
-    pair = both[order[first[counts == 2, None] + np.arange(2)]]
+    ways = _ways(ends)
+    ways = ways[store.kinds[ways[:, 0]] == VertexKind.CROSSING]
+    twos = _twos(ways, fabric.points[ways[:, 0]])
     place = store.place[:, -2:]
-    ways = place[pair[:, :, 1]] - place[pair[:, :, 0]]
-    back = np.einsum("nk,nk->n", ways[:, 0], ways[:, 1]) > 0.0
-    return np.asarray(pair[back, 0, 0])
+    along = place[twos[:, :, 1]] - place[twos[:, :, 0]]
+    back = np.einsum("nk,nk->n", along[:, 0], along[:, 1]) > 0.0
+    return np.asarray(twos[back, 0, 0])
+
+
+def _ways(ends: Pairs) -> Int[np.ndarray, "ways 2"]:
+    """Edges from either end to the other one."""
+    return np.concatenate([ends, ends[:, ::-1]])
+
+
+def _twos(
+    ways: Int[np.ndarray, "ways 2"], start: Int[np.ndarray, " ways"]
+) -> Int[np.ndarray, "m 2 2"]:
+    """Both ways from each point from which just two lead; `start`: the point of each way."""
+    order = np.argsort(start, kind="stable")
+    _, first, counts = np.unique(start[order], return_index=True, return_counts=True)
+    return np.asarray(ways[order[first[counts == 2, None] + np.arange(2)]])
 
 
 def _turning(fabric: Fabric, ends: Pairs) -> Int[np.ndarray, " m"]:
@@ -129,38 +149,51 @@ def with_cusps_beside(fabric: Fabric, beside: CellFlags) -> Fabric:
     """
     near = np.zeros(len(fabric.vertices), bool)
     near[fabric.cells[beside]] = True
-    ends, found = cusps_on_edges(fabric, near)
-    place = fabric.vertices.place
-    gap = np.stack([np.linalg.norm(found.place - place[end], axis=1) for end in ends.T])
-    whole = np.linalg.norm(place[ends[:, 1]] - place[ends[:, 0]], axis=1)
-    whole_edges = (fabric.edge_marks(np.sort(ends, axis=1)) & (FacetMark.HOLE | FacetMark.RIM)) == 0
-    apart = np.flatnonzero((gap > CLOSE * whole).all(axis=0) & whole_edges)
-    return fabric.bisect(ends[apart], found.take(apart)) if len(apart) else fabric
+    _, ends, found = cusps_of(fabric, near)
+    marks = fabric.edge_marks(np.sort(ends, axis=1))
+    whole = np.flatnonzero((marks & (FacetMark.HOLE | FacetMark.RIM)) == 0)
+    return fabric.bisect(ends[whole], found.take(whole)) if len(whole) else fabric
 
 
-def cusps_on_edges(fabric: Fabric, near: VertexFlags | None = None) -> tuple[Pairs, Vertices]:
-    """Fold edges with cusps, of those with an end near a place, and the cusps."""
+def cusps_of(fabric: Fabric, near: VertexFlags | None = None) -> tuple[Some, Pairs, Vertices]:
+    """Vertices at cusps, fold edges with cusps between their ends, and these cusps.
+
+    near: which vertices an edge must have one of, if not all edges count.
+    """
     ends = fabric.facets[(fabric.marks & FacetMark.FOLD) > 0]
     if near is not None:
         ends = ends[near[ends].any(axis=1)]
     store = fabric.vertices
-    if len(ends) == 0:
-        return ends, store.take(np.zeros(0, int))
-    side = sides_of_existence(store.take(ends[:, 0]))
-    other = sides_of_existence(store.take(ends[:, 1]))
-    known = np.stack(
-        [np.einsum("ni,ni->n", side, side), np.einsum("ni,ni->n", side, other)], axis=1
-    )
-    turning = np.flatnonzero(known[:, 1] < 0.0)
+    folded, at = np.unique(ends, return_inverse=True)
+    if len(folded) == 0:
+        return folded, ends, store.take(folded)
+    at, side = at.reshape(ends.shape), sides_of_existence(store.take(folded))
+    size = np.linalg.norm(side, axis=1)
+    met = folded[_vanishing(at, side, size)]
+    known = np.einsum("nki,nki->nk", side[at[:, :1]], side[at])
+    apart = size[at].min(axis=1) > CLOSE * size[at].max(axis=1)
+    turning = np.flatnonzero((known[:, 1] < 0.0) & apart)
     if len(turning) == 0:
-        return ends[:0], store.take(turning)
-    lowest = store.index[ends[turning]].min(axis=1)
+        return met, ends[:0], store.take(turning)
+    ends, known, first = ends[turning], known[turning], side[at[turning, 0]]
 
     def value(at: Vertices, lanes: Items) -> ItemValues:
-        return np.asarray(np.einsum("ni,ni->n", side[turning[lanes]], sides_of_existence(at)))
+        return np.asarray(np.einsum("ni,ni->n", first[lanes], sides_of_existence(at)))
 
-    done, found = roots(fabric, ends[turning], FacetMark.FOLD, lowest, known[turning], value)
-    return ends[turning[done]], found
+    lowest = store.index[ends].min(axis=1)
+    done, found = roots(fabric, ends, FacetMark.FOLD, lowest, known, value)
+    return met, ends[done], found
+
+
+def _vanishing(at: Pairs, side: Float[np.ndarray, "V 2"], size: Float[np.ndarray, " V"]) -> Some:
+    """Vertices of a fold at which the sides of existence vanish, to change to the opposite ones."""
+    ways = _ways(at)
+    twos = _twos(ways, ways[:, 0])
+    own, others = twos[:, 0, 0], twos[:, :, 1]
+    opposite = np.einsum("ni,ni->n", *np.swapaxes(side[others], 0, 1)) < 0.0
+    sizes = size[others]
+    least = (size[own] <= CLOSE * sizes.max(axis=1)) & (size[own] <= sizes.min(axis=1))
+    return np.asarray(own[opposite & least])
 
 
 def sides_of_existence(at: Vertices) -> Float[np.ndarray, "n 2"]:
