@@ -6,7 +6,7 @@ from scipy.spatial import Delaunay
 
 import equimorph as em
 from equimorph.equilibria import Guards, settle
-from equimorph.manifold.lookup.cell_index import NUDGE, CellIndex
+from equimorph.manifold.lookup.cell_index import NUDGE, CellIndex, meeting_boxes
 from equimorph.manifold.lookup.exact_states import CLOSEST, ROUND_OFF, exact_states, root_weights
 from equimorph.manifold.lookup.kernels import (
     balanced,
@@ -39,6 +39,22 @@ def simplices(points: np.ndarray) -> np.ndarray:
 def barycentric(corners: np.ndarray, point: np.ndarray) -> np.ndarray:
     matrix = np.concatenate([corners.T, np.ones((1, len(corners)))])
     return np.linalg.solve(matrix, np.append(point, 1.0))
+
+
+@pytest.mark.parametrize("d", [1, 2, 3])
+def test_boxes_that_meet_are_found_once(d):
+    """Every pair by itself; a fifth of the boxes are up to a hundred times larger than others."""
+    generator = np.random.default_rng(d)
+    size = generator.uniform(0.01, 0.1, (80, 1, 1))
+    size[::5] *= 10.0
+    corners = generator.uniform(size=(80, 1, d)) + size * generator.uniform(size=(80, d + 1, d))
+    pairs = meeting_boxes(corners)
+    low, high = corners.min(axis=1), corners.max(axis=1)
+    one, other = np.triu_indices(80, 1)
+    meet = ((low[one] <= high[other]) & (low[other] <= high[one])).all(axis=1)
+    found = np.sort(pairs, axis=1)
+    assert len(np.unique(found, axis=0)) == len(found) > 50
+    assert set(map(tuple, found.tolist())) == set(zip(one[meet], other[meet], strict=True))
 
 
 @pytest.mark.parametrize("d", [1, 2, 3])

@@ -3,23 +3,20 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import breadth_first_order, dijkstra, maximum_flow
-from scipy.spatial import cKDTree
+from scipy.sparse.csgraph import dijkstra
 
 from equimorph.arrays import Bool, Float, Int, Pairs, VertexNumbers
 from equimorph.charts.kernels import overlap_flags
 from equimorph.charts.location import Cells
+from equimorph.linalg.graph_kernels import side_of_least_cut
 from equimorph.linalg.graphs import graph_of
 from equimorph.manifold.geometry.topology import labels
-from equimorph.manifold.lookup.cell_index import CellIndex
+from equimorph.manifold.lookup.cell_index import CellIndex, meeting_boxes
 
 TOUCHING = 1e-7
 """Depth of an overlap, in sizes of cells, up to which cells only touch."""
 SHARP = 10_000
 """Capacity of the longest facet: the resolution of lengths in the integer flow problem."""
-ENDLESS = 2**30
-"""Largest capacity: more would not fit the integer flow problem."""
 
 
 @dataclass(frozen=True)
@@ -59,12 +56,11 @@ def overlapping(cells: Cells, cusps: VertexNumbers) -> Pairs:
     sheet goes all the way round its cusp, and its cells on both folds there overlap. Cells turned
     over by chords of curved folds cover nothing.
     """
-    values = cells.values[cells.corners]
-    size = np.maximum(np.median(np.ptp(values, axis=1), axis=0), 1e-300)
     plain = np.flatnonzero(cells.turn * np.sign(cells.turn.sum()) > 0.0)
-    corners, vertices = (values / size)[plain], cells.corners[plain]
+    vertices = cells.corners[plain]
+    corners = (cells.values / cells.extent)[vertices]
     if corners.shape[2] == 2:
-        pairs, inward = _near_pairs(corners), _inward(corners)
+        pairs, inward = meeting_boxes(corners), _inward(corners)
     else:
         hits = CellIndex.of(corners, np.zeros(len(corners))).near(corners.mean(axis=1))
         pairs = np.stack([hits.point[hits.inside], hits.cell[hits.inside]], axis=1)
@@ -83,25 +79,6 @@ def _inward(corners: Float[np.ndarray, "C 3 2"]) -> Float[np.ndarray, "C 3 2"]:
     normal = np.stack([-along[..., 1], along[..., 0]], axis=2)
     normal /= np.maximum(np.hypot(normal[..., 0], normal[..., 1])[..., None], 1e-300)
     return np.asarray(normal * np.sign((normal * third).sum(axis=2))[..., None])
-
-
-def _near_pairs(corners: Float[np.ndarray, "C 3 2"]) -> Pairs:
-    """Pairs of cells whose circles around their middles meet, by classes of size."""
-    middle = corners.mean(axis=1)
-    radius = np.linalg.norm(corners - middle[:, None], axis=2).max(axis=1)
-    order = np.argsort(radius, kind="stable")
-    bounds = np.searchsorted(radius[order], radius[order[-1:]] * 0.5 ** np.arange(12)[::-1])
-    groups = [g for g in np.split(order, np.unique(bounds)) if len(g)]
-    trees = [cKDTree(middle[group]) for group in groups]
-    pairs = [np.zeros((0, 2), int)]
-    for i, (own, tree) in enumerate(zip(groups, trees, strict=True)):
-        far = radius[own].max()
-        pairs.append(own[tree.query_pairs(2.0 * far, output_type="ndarray")])
-        for other, beside in zip(groups[:i], trees[:i], strict=True):
-            reach = far + radius[other].max()
-            near = tree.sparse_distance_matrix(beside, reach, output_type="ndarray")
-            pairs.append(np.stack([own[near["i"]], other[near["j"]]], axis=1))
-    return np.concatenate(pairs)
 
 
 def _split(
@@ -144,27 +121,11 @@ def least_cut(
     """Cells on the first one's side of the shortest cut between two groups of cells.
 
     The least cut of the dual graph, with the sizes of facets in scaled parameters as capacities.
-    Each group is one of its nodes.
     """
-    whole, middle = cells.whole, ~(first | second)
-    size = facet_sizes(cells)[whole.across]
-    capacity = np.maximum(1, np.round(SHARP * size / max(size.max(), 1e-300)))
-    source, sink, count = 0, 1, 2 + int(middle.sum())
-    node = np.where(second, sink, source)
-    node[middle] = np.arange(2, count)
-    ends = node[whole.links]
-    apart = ends[:, 0] != ends[:, 1]
-    a, b = ends[apart].T
-    rows, columns = np.concatenate([a, b]), np.concatenate([b, a])
-    graph = coo_array((np.tile(capacity[apart], 2), (rows, columns)), shape=(count, count)).tocsr()
-    graph.data = np.minimum(graph.data, ENDLESS)
-    graph = graph.astype(np.int32)
-    left = graph - maximum_flow(graph, source, sink).flow
-    left.data = np.maximum(left.data, 0)
-    left.eliminate_zeros()
-    side = np.zeros(count, bool)
-    side[breadth_first_order(left, source, return_predecessors=False)] = True
-    return side[node]
+    size = facet_sizes(cells)[cells.whole.across]
+    capacity = np.maximum(1, np.round(SHARP * size / max(size.max(), 1e-300))).astype(np.int64)
+    links = np.ascontiguousarray(cells.whole.links, np.int64)
+    return np.asarray(side_of_least_cut(links, capacity, first, second))
 
 
 def facet_sizes(cells: Cells) -> Float[np.ndarray, " F"]:

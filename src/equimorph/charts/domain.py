@@ -238,7 +238,7 @@ def single_valued(cells: Cells) -> bool:
     if len(cells.coordinates.names) != 2:
         return not _overlapping(cells).any()
     regions = regions_within(cells.values, *outline(cells.values, cells.corners))
-    return not without_slivers(regions.loops(lambda n: n > 1), typical_extent(cells))
+    return not without_slivers(regions.loops(lambda n: n > 1), cells.extent)
 
 
 def overlaps(cells: Cells) -> tuple[Overlap, ...]:
@@ -286,19 +286,13 @@ def _common(first: Regions, second: Regions) -> tuple[Loop, ...]:
 
 def _domain_inside(cells: Cells, loops: tuple[Loop, ...], drawn: Int[np.ndarray, "_ 2"]) -> Domain:
     """Domain inside loops, whose edges lie on those of the cells' outlines."""
-    kept = without_slivers(loops, typical_extent(cells))
+    kept = without_slivers(loops, cells.extent)
     facets, kinds = facet_kinds(cells)
     at = places_among(drawn, facets, len(cells.eset.points))
     of_drawn = np.where(at >= 0, kinds[at], EdgeKind.SINGULAR)
     ends = cells.values[drawn]
     along = tuple(kinds_along(loop, ends, of_drawn) for loop in kept)
     return Domain(cells.coordinates.names, kept, along)
-
-
-def typical_extent(cells: Cells) -> Place:
-    """Median extent of the cells along each coordinate."""
-    extent = np.ptp(cells.values[cells.corners], axis=1)
-    return np.asarray(np.maximum(np.median(extent, axis=0), 1e-300))
 
 
 def _overlapping(cells: Cells) -> Bool[np.ndarray, " own"]:

@@ -110,6 +110,13 @@ class Cells:
         return np.asarray(self.eset.cells[self.numbers])
 
     @cached_property
+    def extent(self) -> Place:
+        """Median extent of the cells along each coordinate."""
+        corners = self.values.T[:, self.corners.T]
+        extent = corners.max(axis=1) - corners.min(axis=1)
+        return np.asarray(np.maximum(np.median(extent, axis=1), 1e-300))
+
+    @cached_property
     def whole(self) -> Adjacency:
         """Which cells share facets."""
         every = len(self.numbers) == len(self.eset.cells)

@@ -25,7 +25,7 @@ from equimorph.arrays import (
 from equimorph.charts.barriers import Barrier, barriers_of, gaps_of
 from equimorph.charts.chart import Chart, Charted, PointStatus
 from equimorph.charts.coordinates import Coordinates, coordinates_of
-from equimorph.charts.domain import Domain, typical_extent
+from equimorph.charts.domain import Domain
 from equimorph.charts.location import Cells
 from equimorph.charts.preference import Preference
 from equimorph.charts.preference_changes import Straight, locate_changes
@@ -119,7 +119,7 @@ class Reduction(Chart):
     @cached_property
     def gaps(self) -> Domain:
         """Points of the box without a state."""
-        return gaps_of(self.domain, self.eset.box, typical_extent(self.cells))
+        return gaps_of(self.domain, self.eset.box, self.cells.extent)
 
     @check_arguments
     def state(self, coords: Points) -> Charted:

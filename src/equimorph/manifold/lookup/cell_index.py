@@ -4,10 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from equimorph.arrays import Bool, Float, Int, Items, Place, Places
+from equimorph.arrays import Bool, Float, Int, Items, Pairs, Place, Places
 from equimorph.columns import Columns
 from equimorph.manifold.geometry.simplices import volumes
-from equimorph.manifold.lookup.kernels import cells_by_bin, cells_near
+from equimorph.manifold.lookup.kernels import cells_by_bin, cells_near, pairs_in_bins
 
 MOST_BINS = 4
 """Bins per cell, at most."""
@@ -73,23 +73,12 @@ class CellIndex:
         `corners`: corners of the cells. `overhang`: how far beyond each cell, or across the facet
         opposite to each corner, a point may lie to be found near it, in barycentric coordinates.
         """
-        d = corners.shape[2]
-        # one coordinate of one corner a row: rows of few numbers are slow to reduce
-        unit = np.ascontiguousarray(corners.T)
-        flat = unit.reshape(d, -1)
-        lower = flat.min(axis=1) if flat.size else np.zeros(d)
-        width = flat.max(axis=1) - lower if flat.size else np.ones(d)
-        width = np.where(width > 0.0, width, 1.0)
-        unit = (unit - lower[:, None, None]) / width[:, None, None]
+        unit, lower, width = _in_unit_cube(corners)
         low, high = unit.min(axis=1), unit.max(axis=1)
-        around = np.broadcast_to(overhang.T, (d + 1, len(corners)))
+        around = np.broadcast_to(overhang.T, (len(unit) + 1, len(corners)))
         # a corner moves with the facets opposite to the other corners
         room = (around.sum(axis=0) - around.min(axis=0)) * (high - low)
-        counts = _bins(high - low + 2.0 * room)
-        first, last = (
-            np.clip((side.T * counts).astype(int, order="C"), 0, counts - 1)
-            for side in (low - room, high + room)
-        )
+        counts, first, last = _bins(low - room, high + room)
         starts, cells = cells_by_bin(first, last, counts)
         maps, overhang = _maps(unit), np.ascontiguousarray(around.T)
         return cls(lower, width, counts, starts, cells, maps, overhang)
@@ -106,8 +95,38 @@ class CellIndex:
         return np.asarray(np.einsum("nij,nj->ni", maps[:, :, :-1], unit) + maps[:, :, -1])
 
 
-def _bins(reach: Float[np.ndarray, "d C"]) -> Int[np.ndarray, " d"]:
-    """Number of bins along each parameter: halves of what typical cells reach, but not too many."""
+def meeting_boxes(corners: Float[np.ndarray, "C corners d"]) -> Pairs:
+    """Pairs of cells with given corners whose boxes around them meet."""
+    unit, _, _ = _in_unit_cube(corners)
+    low, high = unit.min(axis=1), unit.max(axis=1)
+    counts, first, last = _bins(low, high)
+    listed = cells_by_bin(first, last, counts)
+    return np.asarray(pairs_in_bins(low, high, first, counts, *listed))
+
+
+def _in_unit_cube(
+    corners: Float[np.ndarray, "C corners d"],
+) -> tuple[Float[np.ndarray, "d corners C"], Place, Place]:
+    """Corners in the box around them, and its lower corner and width.
+
+    One coordinate of one corner a row: rows of few numbers are slow to reduce.
+    """
+    unit, d = np.ascontiguousarray(corners.T), corners.shape[2]
+    flat = unit.reshape(d, -1)
+    lower = flat.min(axis=1) if flat.size else np.zeros(d)
+    width = flat.max(axis=1) - lower if flat.size else np.ones(d)
+    width = np.where(width > 0.0, width, 1.0)
+    return (unit - lower[:, None, None]) / width[:, None, None], lower, width
+
+
+def _bins(
+    low: Float[np.ndarray, "d C"], high: Float[np.ndarray, "d C"]
+) -> tuple[Int[np.ndarray, " d"], Int[np.ndarray, "C d"], Int[np.ndarray, "C d"]]:
+    """Number of bins along each parameter, and the first and last that cells reach.
+
+    Bins are halves of what typical cells reach, but not too many.
+    """
+    reach = high - low
     d, cells = reach.shape
     typical = np.median(reach, axis=1) if cells else np.ones(d)
     counts = np.clip(np.round(2.0 / np.maximum(typical, 1e-6)), 1, None)
@@ -118,7 +137,10 @@ def _bins(reach: Float[np.ndarray, "d C"]) -> Int[np.ndarray, " d"]:
         if entries.sum() <= MOST_ENTRIES * cells:
             break
         counts = np.maximum(COARSER * counts, 1).astype(int)
-    return np.asarray(counts)
+    first, last = (
+        np.clip((side.T * counts).astype(int, order="C"), 0, counts - 1) for side in (low, high)
+    )
+    return counts, first, last
 
 
 def _maps(unit: Float[np.ndarray, "d corners C"]) -> Float[np.ndarray, "C corners corners"]:

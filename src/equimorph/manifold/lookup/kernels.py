@@ -50,6 +50,32 @@ def cells_by_bin(first, last, counts):
 
 
 @njit(**ACCURATE)
+def pairs_in_bins(low, high, first, counts, starts, cells):
+    """Pairs of cells whose boxes meet, each in the first bin that lists both.
+
+    low, high (d, C): the boxes; first (C, d): first bins that they reach; counts (d,), starts,
+    cells: see `cells_by_bin`.
+    """
+    found, count = np.empty((len(cells), 2), np.int64), 0
+    for number in range(len(starts) - 1):
+        for i in range(starts[number], starts[number + 1]):
+            for j in range(i + 1, starts[number + 1]):
+                one, other, common = cells[i], cells[j], 0
+                for k in range(len(counts)):
+                    if low[k, one] > high[k, other] or low[k, other] > high[k, one]:
+                        common = -1
+                        break
+                    common = common * counts[k] + max(first[one, k], first[other, k])
+                if common != number:
+                    continue
+                if count == len(found):
+                    found = np.concatenate((found, np.empty_like(found)))
+                found[count, 0], found[count, 1] = one, other
+                count += 1
+    return found[:count]
+
+
+@njit(**ACCURATE)
 def cells_near(points, bins, maps, overhang, nudge):
     """Pairs of a point and a cell near it; see `CellIndex.near`.
 
