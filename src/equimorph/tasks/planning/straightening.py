@@ -1,6 +1,6 @@
 """Paths over a mesh made straight, moved to where they cost least, and verified as routes."""
 
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,7 +13,7 @@ from equimorph.errors import InputError
 from equimorph.linalg.graphs import shortest_path
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Descriptor, position
-from equimorph.structures import States
+from equimorph.structures import States, join_states
 from equimorph.tasks.planning.corner_moves import ActuatorBox, chords, move_by_chords, move_by_lifts
 from equimorph.tasks.planning.network import Demands, Ends, connect
 from equimorph.tasks.planning.shortening import Shortener
@@ -38,6 +38,9 @@ GAIN = 1e-4
 """Share of the cost that a shorter list of corners may cost more."""
 FINE_GAIN, NEARLY = 5e-5, 1.0
 """The same where corners come from shortest curves, and what the best list may save, in corners."""
+
+Lifting = Generator[tuple[States, States], tuple[Flags, Values], States]
+"""A search for corners that asks for straight lifts between pairs of states, and waits for them."""
 
 
 def straighten(states: States, demands: Demands, same_class: bool = False) -> States:
@@ -105,7 +108,7 @@ def relax_corners(
         corners, whole = _keep_liftable(corners, move_by_chords(corners, demands, room), demands)
         if not whole:
             corners = move_by_lifts(corners, demands, room, quick=True)
-    return _thin_out(corners, demands, same_class)
+    return _lift_for([_thin_out(corners, demands, same_class)], [demands])[0]
 
 
 def _keep_liftable(before: States, after: States, demands: Demands) -> tuple[States, bool]:
@@ -148,7 +151,9 @@ def _lift_straight(states: States, p: Parameters, demands: Demands) -> tuple[Lan
     return there.z, (outcome.code == EventCode.ARRIVED) & there.found
 
 
-def _thin_out(corners: States, demands: Demands, same_class: bool, gain: float = GAIN) -> States:
+def _thin_out(
+    corners: States, demands: Demands, same_class: bool, gain: float = GAIN
+) -> Lifting:
     """Fewest corners whose chain costs hardly more.
 
     Costs along chords say which legs are lifted: those of the best chain, until all of it are.
@@ -168,11 +173,33 @@ def _thin_out(corners: States, demands: Demands, same_class: bool, gain: float =
             return corners[known]
         used = legs.along(path, same_class)
         fresh = used[~legs.lifted[used]]
-        found = connect(corners[first[fresh]], corners[second[fresh]], demands)
+        found = yield corners[first[fresh]], corners[second[fresh]]
         legs.linked[fresh], legs.cost[fresh] = found
         legs.lifted[fresh] = True
         if same_class:
             legs.linked &= _swept(first, second, legs.linked | ~legs.lifted)
+
+
+def _lift_for(searches: Sequence[Lifting], demands: Sequence[Demands]) -> list[States]:
+    """Results of searches: what they ask for under the same margin is lifted at once."""
+    results, answers = dict[int, States](), dict.fromkeys(range(len(searches)))
+    while answers:
+        asked = dict[int, tuple[States, States]]()
+        for k, answer in answers.items():
+            try:
+                asked[k] = searches[k].send(answer)
+            except StopIteration as end:
+                results[k] = end.value
+        for margin in {demands[k].margin for k in asked}:
+            some = [k for k in asked if demands[k].margin == margin]
+            ends = zip(*(asked[k] for k in some), strict=True)
+            source, target = (join_states(each[0].structure, each) for each in ends)
+            found = connect(source, target, demands[some[0]])
+            cuts = np.cumsum([len(asked[k][0]) for k in some])[:-1]
+            parts = zip(*(np.split(each, cuts) for each in found), strict=True)
+            answers |= dict(zip(some, parts, strict=True))
+        answers = {k: answers[k] for k in asked}
+    return [results[k] for k in range(len(searches))]
 
 
 @dataclass
@@ -273,10 +300,7 @@ def straight_corners(
 ) -> list[States]:
     """Corners of straightened paths, both ends of each among them."""
     curves = Shortener(eset, _closely(paths, demands)).curves_near(paths)
-    return [
-        _cheapest_corners(eset, *each, demands, same_class)
-        for each in zip(paths, curves, strict=True)
-    ]
+    return _cheapest_corners(eset, paths, curves, demands, same_class)
 
 
 def best_corners(eset: EquilibriumSet, paths: Sequence[States], demands: Demands) -> States:
@@ -284,7 +308,7 @@ def best_corners(eset: EquilibriumSet, paths: Sequence[States], demands: Demands
     if len(paths) == 1:
         return straight_corners(eset, paths, demands)[0]
     best, curve = Shortener(eset, _closely(paths, demands)).shortest_near(paths)
-    return _cheapest_corners(eset, paths[best], curve, demands, same_class=False)
+    return _cheapest_corners(eset, [paths[best]], [curve], demands, same_class=False)[0]
 
 
 def _closely(paths: Sequence[States], demands: Demands) -> Demands:
@@ -297,13 +321,32 @@ def _closely(paths: Sequence[States], demands: Demands) -> Demands:
 
 
 def _cheapest_corners(
-    eset: EquilibriumSet, path: States, curve: States | None, demands: Demands, same_class: bool
+    eset: EquilibriumSet,
+    paths: Sequence[States],
+    curves: Sequence[States | None],
+    demands: Demands,
+    same_class: bool,
+) -> list[States]:
+    """Corners of the shortest curves near paths, or cheaper ones where other than lengths count."""
+    some = [k for k, curve in enumerate(curves) if curve is not None]
+    closely = [_closely([paths[k]], demands) for k in some]
+    searches = [
+        _thin_out(curves[k], own, same_class, FINE_GAIN)
+        for k, own in zip(some, closely, strict=True)
+    ]
+    shortest = dict(zip(some, _lift_for(searches, closely), strict=True))
+    return [
+        shortest[k]
+        if k in shortest and demands.objective.is_length
+        else _cheaper(eset, path, shortest.get(k), demands, same_class)
+        for k, path in enumerate(paths)
+    ]
+
+
+def _cheaper(
+    eset: EquilibriumSet, path: States, shortest: States | None, demands: Demands, same_class: bool
 ) -> States:
-    """Corners of the shortest curve near a path, or cheaper ones where other than lengths count."""
-    closely = _closely([path], demands)
-    shortest = None if curve is None else _thin_out(curve, closely, same_class, FINE_GAIN)
-    if shortest is not None and demands.objective.is_length:
-        return shortest
+    """Corners of a path, or those of the shortest curve near it, moved to where they cost least."""
     free = np.array([position(eset.structure.parameters, name) for name in eset.names])
     room = ActuatorBox(eset.box, free)
     ways = [
