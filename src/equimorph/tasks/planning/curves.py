@@ -221,21 +221,23 @@ class CurveSteps:
         far = ~np.isfinite(distance)  # as from a barrier where there is nothing to cross
         distance, scale = np.where(far, 0.0, distance), np.where(far, 1.0, distance)
         there, found = project_onto_set(setting, nodes.z, nodes.p, nodes.rows)
+        todo = np.arange(len(found))
         for _ in range(PUSHES):
-            below, _ = self.placed(below, there)
-            lack = distance - below.walls
+            at, (below, _) = there.take(todo), self.placed(below, there.take(todo))
+            lack = distance[todo] - below.walls
             lack[:, 0] += BELOW
-            worst = (lack / scale).argmax(axis=1)
-            near = (lack > NEARER * distance).any(axis=1) & np.isfinite(lack.max(axis=1))
-            some = np.flatnonzero(near & found)
+            near = (lack > NEARER * distance[todo]).any(axis=1) & np.isfinite(lack.max(axis=1))
+            some = np.flatnonzero(near & found[todo])
             if len(some) == 0:
                 break
-            frames, at = tangents_at(setting, there.take(some))
-            slopes = self._slopes(below.take(some), frames)[np.arange(len(some)), worst[some]]
-            push = lack[some, worst[some]] / np.maximum((slopes**2).sum(axis=1), 1e-300)
+            todo, below, lack = todo[some], below.take(some), lack[some]
+            worst = (np.arange(len(todo)), (lack / scale[todo]).argmax(axis=1))
+            frames, at = tangents_at(setting, at.take(some))
+            slopes = self._slopes(below, frames)[worst]
+            push = lack[worst] / np.maximum((slopes**2).sum(axis=1), 1e-300)
             z, p = step_along(setting, at, frames, push[:, None] * slopes)
-            moved, found[some] = project_onto_set(setting, z, p, at.rows)
-            there = there.with_rows(some, moved)
+            moved, found[todo] = project_onto_set(setting, z, p, at.rows)
+            there = there.with_rows(todo, moved)
         nodes, inside = self.placed(nodes, there)
         return nodes, found & inside
 

@@ -93,7 +93,7 @@ class Shortener:
             rough = dict(zip(some, self._shorten(list(some.values()), STRENGTHS), strict=True))
             best = min(rough, key=lambda k: float(self._gaps(self._steps.states(rough[k])).sum()))
         if some and self.demands.margin == 0.0:  # else floors are those of longer legs
-            fine = self._halved(rough[best], np.arange(len(rough[best].z) - 1))
+            fine = self._halved([rough[best]], [np.arange(len(rough[best].z) - 1)])[0]
             self._link({} if fine is None else {best: fine}, STRENGTHS[-1:], found)
         if found:
             return best, self._steps.states(found[best])
@@ -138,13 +138,14 @@ class Shortener:
         left = dict[int, Curves]()
         for _ in range(DIVISIONS if todo else 0):
             shorter = self._shorten(list(todo.values()), strengths)
-            curves, todo, strengths = zip(todo, shorter, strict=True), {}, strengths[-1:]
-            for (k, curve), (linked, good) in zip(curves, self._lifts(shorter), strict=True):
-                if linked:
+            linked, good = zip(*self._lifts(shorter), strict=True)
+            divided = zip(todo, shorter, linked, self._divided(shorter, good), strict=True)
+            todo, strengths = {}, strengths[-1:]
+            for k, curve, whole, finer in divided:
+                if whole:
                     found[k] = curve
-                divided = None if good.all() else self._divided(curve, good)
-                if divided is not None:
-                    todo[k] = divided
+                if finer is not None:
+                    todo[k] = finer
                 else:
                     left[k] = curve
             if not todo:
@@ -166,30 +167,45 @@ class Shortener:
         own = [every.route[ends] == route for route in range(count)]
         return [(bool(linked[some].all()), close[some]) for some in own]
 
-    def _divided(self, curve: Curves, good: Flags) -> Curves | None:
-        """Curve with bad legs in four parts and those beside in two; None where that fails."""
-        bad = ~good
-        beside = bad.copy()
-        beside[1:] |= bad[:-1]
-        beside[:-1] |= bad[1:]
-        half = self._halved(curve, np.flatnonzero(beside))
-        if half is None:
-            return None
-        first = np.arange(len(good)) + np.cumsum(beside) - beside
-        return self._halved(half, np.sort(np.concatenate([first[bad], first[bad] + 1])))
+    def _divided(self, curves: list[Curves], good: Sequence[Flags]) -> list[Curves | None]:
+        """Curves with bad legs in four parts and those beside in two; None where that fails."""
+        legs, again = list[Some](), list[Some]()
+        for fine in good:
+            bad, beside = ~fine, ~fine
+            beside[1:] |= bad[:-1]
+            beside[:-1] |= bad[1:]
+            first = np.arange(len(bad)) + np.cumsum(beside) - beside
+            legs.append(np.flatnonzero(beside))
+            again.append(np.sort(np.concatenate([first[bad], first[bad] + 1])))
+        return self._halved(self._halved(curves, legs), again)
 
-    def _halved(self, curve: Curves, legs: Some) -> Curves | None:
-        """Curve with a node in the middle of some legs; None if one is outside."""
-        if len(curve.z) + len(legs) > MOST_NODES:
-            return None
-        share = curve.share.copy()
-        share[legs + 1] *= 0.5
-        curve = replace(curve, share=share)
-        middle, inside = self._steps.between(curve.take(legs), curve.take(legs + 1))
-        if not inside.all():
-            return None
-        order = np.argsort(np.concatenate([np.arange(len(curve.z)), legs + 0.5]), kind="stable")
-        return Curves.concatenate([curve, middle]).take(order)
+    def _halved(
+        self, curves: Sequence[Curves | None], legs: Sequence[Some]
+    ) -> list[Curves | None]:
+        """Curves with nodes in the middle of some legs; None of none, or if one is outside."""
+        out: list[Curves | None] = [None] * len(curves)
+        some = dict[int, Curves]()
+        for k, curve in enumerate(curves):
+            if curve is not None and 0 < len(legs[k]) <= MOST_NODES - len(curve.z):
+                share = curve.share.copy()
+                share[legs[k] + 1] *= 0.5
+                some[k] = replace(curve, share=share)
+        if not some:
+            return out
+        first, second = (
+            Curves.concatenate([curve.take(legs[k] + end) for k, curve in some.items()])
+            for end in (0, 1)
+        )
+        middle, inside = self._steps.between(first, second)
+        begin = 0
+        for k, curve in some.items():
+            own = np.arange(begin, begin + len(legs[k]))
+            begin += len(own)
+            if inside[own].all():
+                at = np.concatenate([np.arange(len(curve.z)), legs[k] + 0.5])
+                order = np.argsort(at, kind="stable")
+                out[k] = Curves.concatenate([curve, middle.take(own)]).take(order)
+        return out
 
     def _shorten(self, curves: list[Curves], strengths: tuple[float, ...]) -> list[Curves]:
         """Curves after Newton steps with weaker and weaker walls."""
