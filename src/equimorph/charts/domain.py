@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from equimorph.argument_checks import check_arguments
-from equimorph.arrays import Bool, Float, Int, Place, Points
+from equimorph.arrays import Bool, Float, Int, Points
 from equimorph.charts.arrangement import cross, outline, winding
 from equimorph.charts.location import Cells, EdgeKind, facet_kinds
 from equimorph.charts.regions import Regions, regions_within

@@ -15,6 +15,7 @@ from equimorph.columns import Columns
 from equimorph.linalg import BorderedSolution
 from equimorph.linalg.lanes import in_background, threads
 from equimorph.structures.equations import Shift
+from equimorph.structures.margin_kernels import rotate_pairs
 from equimorph.structures.metric import metric_length
 
 RELATIVE = 1e-11
@@ -218,40 +219,15 @@ def _swept(
     rhs = np.zeros((len(shift), 2, structure.size))
     np.multiply(vectors[:, :, :n], mass, out=rhs[:, :, :n])
     solution = structure.solve(z, p, rhs, shift=shift)
-    solved = solution.x[:, :, :n]
-    with np.errstate(all="ignore"):  # a singular solve is not good
-        # Ritz values of the inverse: eigenvalues of Xᵀ M (K⁻¹ M X), 2 × 2
-        a, b, c = _products(rhs[:, :, :n], solved)
-        mean, half = 0.5 * (a + c), np.hypot(0.5 * (a - c), b)
-        angle = 0.5 * np.arctan2(2.0 * b, a - c)
-        cos, sin = np.cos(angle), np.sin(angle)
-        # products of the rotated vectors in the metric
-        e, f, g = _products(solved * mass, solved)
-        top, cross = cos**2 * e + 2.0 * cos * sin * f + sin**2 * g, cos * sin * (g - e)
-        cross += (cos**2 - sin**2) * f
-        low = sin**2 * e - 2.0 * cos * sin * f + cos**2 * g
-        part = cross / top
-        one = 1.0 / np.sqrt(top)
-        two = 1.0 / np.sqrt(np.maximum(low - part * cross, 1e-14 * top))
-        mix = np.stack([cos * one, sin * one, -(sin + part * cos) * two, (cos - part * sin) * two])
-        # K y = M x: the Rayleigh quotient of y needs no product with K
-        above = (mean + half) / top
-        first = shift + above
-        # a single vector is the mode itself
-        alone = n - structure.constraints < 2
-        off = np.zeros(len(shift)) if alone else np.maximum(1.0 / top - above**2, 0.0)
-        second = shift + 1.0 / np.maximum(mean - half, NEAR * (mean + half))
-        good = (solution.negative == structure.constraints) & np.isfinite(first + second)
-        first, second = (np.where(good, each, 1.0) for each in (first, second))
-        pairs = np.einsum("abl,lbi->lai", mix.reshape(2, 2, -1), solution.x)
-    return Softest(pairs, first, second, np.asarray(good), off)
-
-
-def _products(left: Pairs, right: Pairs) -> tuple[Values, Values, Values]:
-    """Products of first and first, first and second, second and second vectors."""
-    ways = ((0, 0), (0, 1), (1, 1))
-    first, mixed, second = (np.einsum("li,li->l", left[:, i], right[:, j]) for i, j in ways)
-    return first, mixed, second
+    pairs, (first, second, off) = np.empty(rhs.shape), np.empty((3, len(shift)))
+    given = (np.ascontiguousarray(each) for each in (solution.x, mass, shift))
+    rotate_pairs(rhs, *given, NEAR, pairs, first, second, off)
+    # a singular solve is not good
+    good = (solution.negative == structure.constraints) & np.isfinite(first + second)
+    first[~good], second[~good] = 1.0, 1.0
+    if n - structure.constraints < 2:  # a single vector is the mode itself
+        off[:] = 0.0
+    return Softest(pairs, first, second, good, off)
 
 
 def _by_bisection(

@@ -179,9 +179,7 @@ class Shortener:
             again.append(np.sort(np.concatenate([first[bad], first[bad] + 1])))
         return self._halved(self._halved(curves, legs), again)
 
-    def _halved(
-        self, curves: Sequence[Curves | None], legs: Sequence[Some]
-    ) -> list[Curves | None]:
+    def _halved(self, curves: Sequence[Curves | None], legs: Sequence[Some]) -> list[Curves | None]:
         """Curves with nodes in the middle of some legs; None of none, or if one is outside."""
         out: list[Curves | None] = [None] * len(curves)
         some = dict[int, Curves]()

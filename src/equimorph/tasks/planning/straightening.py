@@ -151,9 +151,7 @@ def _lift_straight(states: States, p: Parameters, demands: Demands) -> tuple[Lan
     return there.z, (outcome.code == EventCode.ARRIVED) & there.found
 
 
-def _thin_out(
-    corners: States, demands: Demands, same_class: bool, gain: float = GAIN
-) -> Lifting:
+def _thin_out(corners: States, demands: Demands, same_class: bool, gain: float = GAIN) -> Lifting:
     """Fewest corners whose chain costs hardly more.
 
     Costs along chords say which legs are lifted: those of the best chain, until all of it are.
