@@ -2,6 +2,7 @@
 
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -180,7 +181,8 @@ def _thin_out(corners: States, demands: Demands, same_class: bool, gain: float =
 
 def _lift_for(searches: Sequence[Lifting], demands: Sequence[Demands]) -> list[States]:
     """Results of searches: what they ask for under the same margin is lifted at once."""
-    results, answers = dict[int, States](), dict.fromkeys(range(len(searches)))
+    results = dict[int, States]()
+    answers: dict[int, Any] = dict.fromkeys(range(len(searches)))
     while answers:
         asked = dict[int, tuple[States, States]]()
         for k, answer in answers.items():
@@ -326,13 +328,13 @@ def _cheapest_corners(
     same_class: bool,
 ) -> list[States]:
     """Corners of the shortest curves near paths, or cheaper ones where other than lengths count."""
-    some = [k for k, curve in enumerate(curves) if curve is not None]
-    closely = [_closely([paths[k]], demands) for k in some]
+    near = {k: curve for k, curve in enumerate(curves) if curve is not None}
+    closely = [_closely([paths[k]], demands) for k in near]
     searches = [
-        _thin_out(curves[k], own, same_class, FINE_GAIN)
-        for k, own in zip(some, closely, strict=True)
+        _thin_out(curve, own, same_class, FINE_GAIN)
+        for curve, own in zip(near.values(), closely, strict=True)
     ]
-    shortest = dict(zip(some, _lift_for(searches, closely), strict=True))
+    shortest = dict(zip(near, _lift_for(searches, closely), strict=True))
     return [
         shortest[k]
         if k in shortest and demands.objective.is_length
