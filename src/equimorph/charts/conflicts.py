@@ -3,12 +3,12 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse.csgraph import dijkstra
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import breadth_first_order, dijkstra, maximum_flow
 
 from equimorph.arrays import Bool, Float, Int, Pairs, VertexNumbers
 from equimorph.charts.kernels import overlap_flags
 from equimorph.charts.location import Cells
-from equimorph.linalg.graph_kernels import side_of_least_cut
 from equimorph.linalg.graphs import graph_of
 from equimorph.manifold.geometry.topology import labels
 from equimorph.manifold.lookup.cell_index import CellIndex, meeting_boxes
@@ -17,6 +17,8 @@ TOUCHING = 1e-7
 """Depth of an overlap, in sizes of cells, up to which cells only touch."""
 SHARP = 10_000
 """Capacity of the longest facet: the resolution of lengths in the integer flow problem."""
+ENDLESS = 2**30
+"""Largest capacity: more would not fit the integer flow problem."""
 
 
 @dataclass(frozen=True)
@@ -121,11 +123,27 @@ def least_cut(
     """Cells on the first one's side of the shortest cut between two groups of cells.
 
     The least cut of the dual graph, with the sizes of facets in scaled parameters as capacities.
+    Each group is one of its nodes.
     """
-    size = facet_sizes(cells)[cells.whole.across]
-    capacity = np.maximum(1, np.round(SHARP * size / max(size.max(), 1e-300))).astype(np.int64)
-    links = np.ascontiguousarray(cells.whole.links, np.int64)
-    return np.asarray(side_of_least_cut(links, capacity, first, second))
+    whole, middle = cells.whole, ~(first | second)
+    size = facet_sizes(cells)[whole.across]
+    capacity = np.maximum(1, np.round(SHARP * size / max(size.max(), 1e-300)))
+    source, sink, count = 0, 1, 2 + int(middle.sum())
+    node = np.where(second, sink, source)
+    node[middle] = np.arange(2, count)
+    ends = node[whole.links]
+    apart = ends[:, 0] != ends[:, 1]
+    a, b = ends[apart].T
+    rows, columns = np.concatenate([a, b]), np.concatenate([b, a])
+    graph = coo_array((np.tile(capacity[apart], 2), (rows, columns)), shape=(count, count)).tocsr()
+    graph.data = np.minimum(graph.data, ENDLESS)
+    graph = graph.astype(np.int32)
+    left = graph - maximum_flow(graph, source, sink).flow
+    left.data = np.maximum(left.data, 0)
+    left.eliminate_zeros()
+    side = np.zeros(count, bool)
+    side[breadth_first_order(left, source, return_predecessors=False)] = True
+    return side[node]
 
 
 def facet_sizes(cells: Cells) -> Float[np.ndarray, " F"]:
