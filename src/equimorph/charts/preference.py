@@ -19,10 +19,10 @@ from equimorph.columns import Columns
 from equimorph.equilibria import ParameterLine, TraceOptions
 from equimorph.equilibria.trace import Traces, trace
 from equimorph.equilibria.trace_options import EventCode
-from equimorph.manifold.lookup.exact_states import exact_states
 from equimorph.model import Constraint
 from equimorph.structures import States, Structure, join_states
 from equimorph.structures.metric import metric_length
+from equimorph.structures.newton import Limits, newton
 
 DIFFERENT = 1e-4
 """Distance in the metric from which on two states over a point are different ones."""
@@ -30,6 +30,9 @@ ITERATIONS = 24
 """Most steps of the regula falsi with halved values, whose order is 1.44."""
 LEAST_STEP = 1e-13
 """Change of a share from which on it counts as exact."""
+NEAR = Limits(too_long=1.0)
+"""Newton's method from guesses between states: scores do not feel what is left after its last step,
+whose square it is."""
 ENDS = (EventCode.FOLD, EventCode.BRANCH_POINT, EventCode.CONSTRAINT)
 
 
@@ -120,8 +123,9 @@ class _Moving(Columns):
     def at(self, structure: Structure, p: Parameters, share: Values) -> tuple[Lanes, Flags]:
         """States between the ends, and which were found on the same sheets."""
         guess = self.first + share[:, None] * (self.last - self.first)
-        z, found, index = exact_states(structure, guess, p)
-        return z, found & (index == self.index)
+        # beside a cusp round-off alone makes Newton's steps longer than `exact_states` allows
+        found = newton(structure, guess, p, NEAR)
+        return found.z, found.found & (found.index == self.index)
 
 
 @dataclass(frozen=True)
