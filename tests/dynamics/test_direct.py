@@ -30,6 +30,16 @@ def test_the_von_mises_truss_snaps_late_by_what_its_fold_predicts(simulator):
     assert played.lateness == pytest.approx(played.expected_lateness, rel=0.3)
 
 
+def test_a_fold_that_a_corner_between_samples_passes_is_met():
+    """F turns back beyond the exact fold of `lift` by 1e-8, a hundredth of what a sample moves."""
+    start, fold = em.lift(von_mises().natural_state(), {"F": 3e-4}).end.state, 3.810871904e-4
+    there, back = {"F": fold + 1e-8}, {"F": 3.1e-4}
+    played = replay([there, back], start, duration=400.0, simulator="own", settings=COARSE)
+    whole = 2.0 * there["F"] - 3e-4 - back["F"]
+    assert played.fold == pytest.approx(400.0 * (fold - 3e-4) / whole, rel=1e-6)
+    assert np.isnan(played.deviation[-1])
+
+
 def test_actuated_rest_lengths_are_followed():
     pytest.importorskip("mujoco", reason="MuJoCo is not installed (extra `replay`)")
     truss = em.Truss(*ARCH, HELD, {"F": {"B": (0.2, -1)}}, {"a": {"A-B": 1.0}}, masses={"B": 1.0})

@@ -38,6 +38,24 @@ def fold_of_chain(state, links):
     return model.quasistatics(state, motion, np.linspace(0.0, 0.5, 26)).fold
 
 
+@pytest.mark.parametrize("delta", [0.74, 0.742])
+@pytest.mark.parametrize("samples", [5, 26, 101])
+def test_a_pair_of_folds_between_samples_is_not_passed(delta, samples):
+    """Two folds of the path in q merge near Δ = 0.75: below, the chain folds, however few samples.
+
+    Reference: 1601 samples, between which the pair is wide; with 101 it was passed in silence.
+    """
+    state = em.Rod().natural_state(Theta=0.6, Delta=delta)
+    model = LinkageModel(ChainedRod(state.structure, 20))
+
+    def motion(time):
+        return np.where(np.arange(len(state.p)) == 2, 2.0 * time, state.p)
+
+    found = model.quasistatics(state, motion, np.linspace(0.0, 1.0, samples))
+    assert found.fold == pytest.approx({0.74: 0.6535465, 0.742: 0.6532155}[delta], abs=1e-6)
+    assert 0.0 < found.last.least < 1e-3 * found.balances[0].least
+
+
 def test_a_route_that_is_safe_is_followed(upright):
     """Twice as coarse and ten times as fast as the acceptance figures, for the fast suite."""
     played = replay(ROUTE, upright, rate=0.2, settings=ReplaySettings(links=20, step=0.05))

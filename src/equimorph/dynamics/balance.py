@@ -23,13 +23,13 @@ CONVERGED = 1e-10
 """Largest Newton step, in radians and lengths of the structure, that counts as none."""
 LARGEST_STEP = 0.5
 """Largest change in one Newton step."""
-CONTRACTION = 0.25
-"""Largest ratio of the second Newton step to the first with which a guess is taken to lie on the
-same branch (Deuflhard, Newton Methods for Nonlinear Problems, 2004, §5.1)."""
+SAME_BRANCH = 0.5
+"""Largest difference of a move from the first Newton steps forth and back between its ends,
+relative to it. Across a pair of folds, ``x³ − x = t``, the one back is a third at most."""
 PENALTY = 1.0
 """Stiffness of closures relative to all others with which a stable equilibrium shows itself."""
 NEAR = 1e-3
-"""First Newton step, in radians and lengths of the structure, that need not contract."""
+"""Difference from the first Newton steps, in radians and lengths of the structure, that is none."""
 NARROWEST = 1e-7
 """Shortest step in time, relative to the whole, with which equilibria are followed to a fold."""
 FOLD_STEPS = 8
@@ -102,36 +102,38 @@ class Balance:
         return float(eigh(stiff, mass, eigvals_only=True, subset_by_index=(0, 0))[0])
 
 
-def balance(
-    linkage: Mechanism, v: Vector, multipliers: Pulls, y: Settings, contraction: float = np.inf
-) -> Balance | None:
-    """Equilibrium near a guess, by Newton's method.
-
-    None if it does not converge, or if its second step is more than `contraction` times the first.
-    """
-    unknown = linkage.unknown
+def balance(linkage: Mechanism, v: Vector, multipliers: Pulls, y: Settings) -> Balance | None:
+    """Equilibrium near a guess, by Newton's method; None if it does not converge."""
     steps: list[float] = []
     v, multipliers = linkage.prescribe(v, y), multipliers.copy()
+    free = int(linkage.free.sum())
     for _ in range(NEWTON_STEPS):
-        residual = linkage.residual(v, multipliers, y)[unknown]
-        matrix = linkage.jacobian(v, multipliers, y)[np.ix_(unknown, unknown)]
-        if not np.isfinite(residual).all():
+        step = _newton_step(linkage, v, multipliers, y)
+        if step is None:
             return None
-        try:
-            step = np.linalg.solve(matrix, -residual)
-        except np.linalg.LinAlgError:
-            return None
-        free = int(linkage.free.sum())
         largest = float(np.abs(step[:free]).max())
         steps.append(largest)
-        if len(steps) == 2 and steps[0] > NEAR and steps[1] > contraction * steps[0]:
-            return None
         step *= min(1.0, LARGEST_STEP / max(largest, 1e-300))
         v[linkage.free] += step[:free]
         multipliers += step[free:]
         if largest < CONVERGED or (len(steps) > 1 and largest**3 < CONVERGED * steps[-2] ** 2):
             return Balance(linkage, v, multipliers, y)
     return None
+
+
+def _newton_step(
+    linkage: Mechanism, v: Vector, multipliers: Pulls, y: Settings
+) -> Float[np.ndarray, " unknown"] | None:
+    """Newton step of free entries and multipliers; None where there is none."""
+    unknown = linkage.unknown
+    residual = linkage.residual(v, multipliers, y)[unknown]
+    if not np.isfinite(residual).all():
+        return None
+    matrix = linkage.jacobian(v, multipliers, y)[np.ix_(unknown, unknown)]
+    try:
+        return np.asarray(np.linalg.solve(matrix, -residual))
+    except np.linalg.LinAlgError:
+        return None
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,17 +170,28 @@ def follow(start: Balance, course: Course, times: Float[np.ndarray, " times"]) -
 
 
 def _next(here: Balance, before: Balance | None, time: float, course: Course) -> Balance | None:
-    """The stable equilibrium at a time, if Newton's method stays near."""
+    """The stable equilibrium at a time, if the one before leads to it."""
     v, multipliers = here.v, here.multipliers
     if before is not None and here.time > before.time:
         share = (time - here.time) / (here.time - before.time)
         v = v + share * (v - before.v)
         multipliers = multipliers + share * (multipliers - before.multipliers)
-    new = balance(here.linkage, v, multipliers, course(time), CONTRACTION)
-    if new is None:
+    new = balance(here.linkage, v, multipliers, course(time))
+    if new is None or not (new.stable and _leads(here, new) and _leads(new, here)):
         return None
-    moved = np.abs(new.v - here.v).max()
-    return replace(new, time=time) if moved < LARGEST_STEP and new.stable else None
+    return replace(new, time=time)
+
+
+def _leads(here: Balance, there: Balance) -> bool:
+    """Whether the move from one equilibrium to another is about what its tangent predicts."""
+    linkage = here.linkage
+    v = linkage.prescribe(here.v, there.y)
+    step = _newton_step(linkage, v, here.multipliers, there.y)
+    if step is None:
+        return False
+    moved = (there.v - v)[linkage.free]
+    gap, way = (float(np.abs(each).max()) for each in (step[: len(moved)] - moved, moved))
+    return way < LARGEST_STEP and gap <= SAME_BRANCH * way + NEAR
 
 
 def fold_time(

@@ -11,7 +11,7 @@ from equimorph.equilibria import check_start, way_points
 from equimorph.errors import InputError
 from equimorph.model import Schedule
 from equimorph.structures import State, Structure
-from equimorph.tasks.route import FINE
+from equimorph.tasks.straight_lines import FINE
 from equimorph.tasks.verification.schedule_check import first_state, follow_polyline
 
 

@@ -298,25 +298,28 @@ def _judge(
     times = fine[samples]
     points = np.array([plant.points_at(record.places[k]) for k in samples])
     rows = motion.at(times)
-    reference = equilibria_along(model, begin, rows).points
-    course = model.statics(begin, motion.at, times, used.damping)
+    # the statics meet the corners between samples, too
+    corners = np.union1d(times, motion.times)
+    sampled = np.searchsorted(corners, times)
+    reference = equilibria_along(model, begin, motion.at(corners)).points[sampled]
+    course = model.statics(begin, motion.at, corners, used.damping)
     size = _size(points[0])
-    last = float(_away(times, points, times, course)[-1])
+    last = float(_away(times, points, corners, course)[-1])
     fold = course.fold
     # at rest where the branch has no equilibrium, it is on another one, however near
     gone = _is_fold(fold) or last > DEPARTURE * size or _elsewhere(plant, course, size)
     departure, where = PART_OF_SNAP * last, None
     if gone:
         everywhere = np.array([plant.points_at(each) for each in record.places])
-        where = _departure(fine, _away(fine, everywhere, times, course) > departure)
+        where = _departure(fine, _away(fine, everywhere, corners, course) > departure)
     expected = course.delay.lateness(departure) if course.delay and gone else float("nan")
     landed = landing(begin.structure, plant.guess(), rows[-1]) if gone else None
     late = float("nan") if where is None or fold is None else where - fold
     return Replay(
         begin, model.simulator, times, rows, points, reference,
         model.chain or points.shape[1],
-        _largest(points - reference), _largest(course.points - reference),
-        _largest(points - course.points), gone, where, fold, late, expected, landed,
+        _largest(points - reference), _largest(course.points[sampled] - reference),
+        _largest(points - course.points[sampled]), gone, where, fold, late, expected, landed,
         record.closure, np.array(record.energy),
     )  # fmt: skip
 

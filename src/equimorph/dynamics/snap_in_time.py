@@ -17,7 +17,7 @@ from equimorph.dynamics.simulators import model_of
 from equimorph.equilibria import Event, lift, snap_landing
 from equimorph.errors import InputError
 from equimorph.structures import State
-from equimorph.tasks.route import FINE
+from equimorph.tasks.straight_lines import FINE
 from equimorph.tasks.verification.schedule_check import follow_polyline
 from equimorph.tolerances import DEPARTURE
 
