@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from equimorph.manifold import VertexKind, equilibrium_set
+from equimorph.manifold.refining.refine import refine
 from equimorph.model import Box, Descriptor
 from equimorph.structures import Rod, Spring
 from oracles.polynomial import Polynomial
@@ -154,6 +155,19 @@ def test_the_audit_names_sheets_that_end_in_sides(place):
     assert "sheets end in sides" in dict(touching.audit.rows())
     assert away.audit.grazing == ()
     assert "sheets end in sides" not in dict(away.audit.rows())
+
+
+def test_sheets_that_end_in_sides_are_named_of_refined_sets_too():
+    """(x² + a)(x − 2) = 0 over a ≥ 0: the sheet x = 2, and singular states x = 0 in a = 0."""
+
+    def energy(x, a, b):
+        return 0.25 * x**4 - (2.0 / 3.0) * x**3 + 0.5 * a * x**2 - 2.0 * a * x
+
+    with unchecked():
+        structure = Polynomial(energy, 1, "ab")
+        eset = equilibrium_set(structure, Box(a=UNIT, b=LONG), intervals=(6, 7))
+    assert dict(eset.audit.grazing[0])["a"] == 0.0
+    assert refine(eset, 1e-2).audit.grazing == eset.audit.grazing
 
 
 def test_cusps_lie_on_sides():

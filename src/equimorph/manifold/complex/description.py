@@ -96,7 +96,7 @@ class Frame:
 
 COUNTED = (
     "checked", "missing", "recovered", "descents", "left_out", "on_lines", "starts", "arrived",
-    "stopped", "cell_size", "touching", "accuracy", "deviation", "unrefined",
+    "stopped", "cell_size", "touching", "grazing", "accuracy", "deviation", "unrefined",
 )  # fmt: skip
 """What was counted as a set was lifted, searched and refined; other cells do not change it."""
 
