@@ -63,15 +63,20 @@ def cusps_of(energy):
     return [each for each in cusps if (np.abs(each[1:]) < 0.98).all()]
 
 
-def set_of(energy, intervals=12):
-    """Its equilibrium set over p and r from −1 to 1."""
+def structure_of(energy):
+    """The structure with an energy; p is an actuator, r a load."""
     text = [" + ".join(f"({v!r})*x**{k}" for k, v in enumerate(e.tolist())) for e in energy]
     x, values = minima(energy, np.zeros(2))
-    structure = em.EnergyStructure(
+    return em.EnergyStructure(
         f"{text[0]} + p*({text[1]}) + r*({text[2]})",
         [em.Unknown("x", float(x[values.argmin()]), (-4.0, 4.0))],
         [em.Parameter("p", "1", 1.0, "actuator", 0.0), em.Parameter("r", "1", 1.0, "load", 0.0)],
     )
+
+
+def set_of(energy, intervals=12):
+    """Its equilibrium set over p and r from −1 to 1."""
+    structure = structure_of(energy)
     with unchecked():
         box = em.Box(p=(-1.0, 1.0), r=(-1.0, 1.0))
         return em.equilibrium_set(structure, box, intervals=(intervals, intervals))

@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 
 from equimorph.errors import InputError
-from equimorph.manifold import equilibrium_set
+from equimorph.manifold import VertexKind, equilibrium_set
 from equimorph.model import Box
 from equimorph.structures import Spring, State
 from equimorph.tasks.planning.planner import plan
+from oracles.sextics import random_energy, set_of
 from typecheck import unchecked
 
 LOAD = (1 - 0.8 / np.cos(0.62)) * np.sin(0.62)
@@ -119,3 +120,15 @@ def test_a_demand_made_twice_counts_once(spring_set, start):
 def test_a_route_to_its_start_is_a_loop_that_needs_way_points(spring_set, start):
     with pytest.raises(InputError, match="`goal` must differ from `start` without `via`"):
         plan(spring_set, start, start)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_an_end_on_a_fold_is_refused_by_this_reason(seed):
+    """At a fold the index is that of either side by round-off: the end is no other component."""
+    eset, draw = set_of(random_energy(seed)), np.random.default_rng(seed)
+    inside = eset.points[int(draw.choice(np.flatnonzero(eset.points.index == 0)))]
+    for k in draw.choice(np.flatnonzero(eset.kinds == VertexKind.FOLD), 4):
+        fold = eset.points[int(k)]
+        reason = "lies on a fold or branch point, where stability is lost"
+        assert plan(eset, inside, fold).why == f"the goal {reason}"
+        assert plan(eset, fold, inside).why == f"the start {reason}"

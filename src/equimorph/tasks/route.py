@@ -7,17 +7,15 @@ from typing import Any, Literal
 import numpy as np
 
 from equimorph.arrays import Float
-from equimorph.equilibria import Event, Landing, Path, TraceOptions, lift, lift_legs
+from equimorph.equilibria import Event, Landing, Path, lift, lift_legs
 from equimorph.errors import InputError
 from equimorph.model import Constraint, Descriptor, Schedule, names_of
 from equimorph.structures import State, States, Structure
 from equimorph.tables import html_table, units_of
 from equimorph.tasks.distances import distance
 from equimorph.tasks.robustness.evidence import Survival
+from equimorph.tasks.straight_lines import FINE, least_margin
 from equimorph.tolerances import SAME_STATE
-
-FINE = TraceOptions(largest_step=0.02, first_step=0.01, turning=0.05, steps=20000)
-"""Step control of the final check of every route."""
 
 Corners = list[dict[str, float]]
 
@@ -90,15 +88,16 @@ class Relaxation:
 class Route:
     """A verified route between two states, or the reason why none was found.
 
-    status: "arrived", or "refused" with the reason in `why`. A route that arrived was lifted again
-    at a finer step: `path`, its smallest stability `margin`, its `length` in the structure's metric
-    and scaled parameters, what it was planned for (`objective`) and its `cost`, and the `schedule`
-    for the actuators. Where snaps were allowed, `snaps` has their landings, in order; where a peak
-    was kept low, `bottleneck` has its exact value and place, and `cost` what the route attains;
-    where errors are to be survived, `survival` has what is shown. A refused route carries the path
-    as far as it went, if there is one; in `relaxations` how far each demand of the caller has to
-    give way alone, where that would do; and `nearest`, the state nearest to the goal that a
-    verified route reaches.
+    status: "arrived", or "refused" with the reason in `why`. A route that arrived was lifted
+    again at a finer step: `path`, its smallest stability `margin` (also between the states of
+    the path), its `length` in the structure's metric and scaled parameters, what it was planned
+    for (`objective`) and its `cost`, and the `schedule` for the actuators. Where snaps were
+    allowed, `snaps` has their landings, in order; where a peak was kept low, `bottleneck` has
+    its exact value and place, and `cost` what the route attains; where errors are to be
+    survived, `survival` has what is shown. A refused route carries the path as far as it went,
+    if there is one; in `relaxations` how far each demand of the caller has to give way alone,
+    where that would do; and `nearest`, the state nearest to the goal that a verified route
+    reaches.
     """
 
     status: Literal["arrived", "refused"]
@@ -210,8 +209,8 @@ def verify_route(
         k = int(np.argmin(margins))
         return refusal(f"unstable at {describe_place(path.states[k], names)}", way_points, path)
     schedule = schedule_of(path, margins, (*(c.descriptor for c in within), *monitor))
-    length = float(path.length[-1])
-    return Route("arrived", "", way_points, path, float(margins.min()), length, schedule)
+    least, length = least_margin(path.states, margins).margin, float(path.length[-1])
+    return Route("arrived", "", way_points, path, least, length, schedule)
 
 
 def _reason(path: Path, names: Sequence[str], segments: int) -> str:
@@ -267,7 +266,7 @@ def schedule_of(
         roles=tuple(parameter.role for parameter in parameters),
         units=tuple(parameter.unit for parameter in parameters),
         values=states.p.copy(),
-        progress=path.length / path.length[-1],
+        progress=path.length / max(path.length[-1], 1e-300),
         margins=margins,
         descriptors=_values_by_name(descriptors, states),
         start={"structure": _identity(structure), "unknowns": states.z[0].tolist()},

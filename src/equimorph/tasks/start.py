@@ -5,11 +5,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from equimorph.equilibria import check_start
+from equimorph.equilibria.soft_modes import soft_modes
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet, Location
 from equimorph.model import Constraint, Schedule, names_of
 from equimorph.structures import State, Structure
 from equimorph.tasks.estimation import StateEstimate
+from equimorph.tolerances import SAME_STATE
 
 Start = State | Location | StateEstimate
 """A state, or what `locate` or `estimate_state` says of a measured one."""
@@ -82,7 +84,15 @@ def inadmissible(
             value = constraint.descriptor(state)
             return f"the {name} violates {constraint}: {constraint.descriptor.name} = {value:.6g}"
     if not state.stable:
-        return f"the {name} is unstable (index {state.index})"
+        return critical(name, state) or f"the {name} is unstable (index {state.index})"
     if margin > 0.0 and state.margin < margin:
         return f"the {name} has a stability margin of {state.margin:.4g}, below {margin:g}"
     return ""
+
+
+def critical(name: str, state: State) -> str:
+    """Words for a start or goal that is no further from its next state than from itself."""
+    apart = soft_modes(state.structure, state.z[None], state.p[None]).own_length[0]
+    if apart > SAME_STATE:
+        return ""
+    return f"the {name} lies on a fold or branch point, where stability is lost"

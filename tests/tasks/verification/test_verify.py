@@ -16,14 +16,21 @@ OTHER_WAY = [{"Delta": 1.3}, {"Theta": 1.3}, {"Delta": 0.0}, {"Theta": 1.0}]
 
 
 @pytest.fixture(scope="module")
-def schedule(arch_set, ends):
-    return plan(arch_set, *ends, via=VIA).schedule
+def route(arch_set, ends):
+    return plan(arch_set, *ends, via=VIA)
 
 
-def test_schedule_of_a_route_is_verified_with_its_margin(ends, schedule):
+@pytest.fixture(scope="module")
+def schedule(route):
+    return route.schedule
+
+
+def test_schedule_of_a_route_is_verified_with_its_margin(ends, route):
+    schedule = route.schedule
     found = verify(schedule)
     assert found.verified
-    assert found.margin == pytest.approx(schedule.margins.min(), rel=1e-6)
+    assert found.margins.min() == pytest.approx(schedule.margins.min(), rel=1e-6)
+    assert found.margin == pytest.approx(route.margin, rel=1e-9)
     np.testing.assert_allclose(found.states.z[-1], ends[1].z, rtol=0, atol=1e-9)
     assert found.schedule.start == schedule.start
     table = found.schedule

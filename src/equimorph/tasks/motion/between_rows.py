@@ -6,14 +6,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from equimorph.arrays import Float, Int, Lanes, Parameters, Some
-from equimorph.equilibria import Leg, Path
-from equimorph.manifold.lookup.exact_states import exact_states
+from equimorph.equilibria import Event, EventKind, Leg, Path
 from equimorph.model import Constraint, Descriptor, are_feasible
 from equimorph.structures import States
 from equimorph.structures.metric import distances
-from equimorph.tasks.distances import path_lengths
+from equimorph.tasks.distances import path_lengths, step_lengths
 from equimorph.tasks.motion.course import EXACT, Course, correct_onto_targets
 from equimorph.tasks.route import describe_place
+from equimorph.tasks.straight_lines import are_led, lift_straight, states_between
+from equimorph.tolerances import SAME_SOLUTION
 
 MOST_ROWS = 20_000
 """Rows of a schedule beyond which none is inserted."""
@@ -48,14 +49,13 @@ class BetweenRows:
         Where no stable state is found from the mean of both, the miss is infinite.
         """
         states = self.path.states
-        first, last, (z, p) = states[:-1], states[1:], self._means()
-        z, good, index = exact_states(states.structure, z, p)
-        here = States(states.structure, z, p)
+        first, last, rows = states[:-1], states[1:], np.arange(len(states) - 1)
+        here, stable = states_between(states, rows, np.full(len(rows), 0.5))
         leg, share = self._places()
-        out = np.zeros((len(p), len(self.descriptors)))
+        out = np.zeros((len(rows), len(self.descriptors)))
         for column, each in zip(out.T, self.descriptors, strict=True):
             wanted = _targets(each, self.legs, leg, share, 0.5 * (each(first) + each(last)))
-            gap = np.where(good & (index == 0), np.abs(each(here) - wanted), np.inf)
+            gap = np.where(stable, np.abs(each(here) - wanted), np.inf)
             column[:] = np.nan_to_num(gap, nan=0.0, posinf=np.inf)
         return out
 
@@ -64,18 +64,56 @@ class BetweenRows:
         here = self
         while True:
             misses = here.misses().max(axis=1, initial=0.0)
-            coarse, rows = np.flatnonzero(misses > accuracy), len(here.path.at)
+            coarse = np.flatnonzero(misses > accuracy)
             if not len(coarse):
                 return here, ""
-            if rows + len(coarse) > MOST_ROWS:
-                why = f"between {rows} rows the targets are missed by {misses.max():.3g}"
-                return here, f"{why}, not {accuracy:.3g} at most"
-            middle, found = here._on_targets(coarse)
-            if not found.all():
-                lost = here.path.states[int(coarse[np.argmin(found)])]
-                place = describe_place(lost, here.actuators)
-                return here, f"no further row within the constraints is found behind {place}"
-            here = here._with_rows(coarse, middle)
+            missed = f"the targets are missed by {misses.max():.3g}, not {accuracy:.3g} at most"
+            finer, why = here._with_middles(coarse, missed)
+            if why:
+                return here, why
+            here = finer
+
+    def held(self) -> tuple["BetweenRows", str]:
+        """Insert rows half-way where stability is lost on the straight line between two of them.
+
+        If it is lost however close these are, the rows end there, and the second answer says why.
+        """
+        here, holds = self, np.zeros(len(self.path.at) - 1, bool)
+        while True:
+            states, new = here.path.states, np.flatnonzero(~holds)
+            holds[new] = are_led(lift_straight(states[new], states.p[new + 1]), states[new + 1])
+            lost = np.flatnonzero(~holds)
+            if not len(lost):
+                return here, ""
+            close = lost[step_lengths(states)[lost] <= SAME_SOLUTION]
+            snaps = "parameters that move straight on lose stability"
+            finer, why = here._with_middles(lost, snaps)
+            if len(close) or why:
+                last = int(close[0]) if len(close) else int(lost[0])
+                place = describe_place(states[last], here.actuators)
+                why = f"{snaps} behind {place}, however close the rows of the schedule are"
+                return here._until(last), why
+            holds = np.insert(holds, lost, False)
+            here = finer
+
+    def _with_middles(self, rows: Some, trouble: str) -> tuple["BetweenRows", str]:
+        """Insert rows half-way behind some, or say why there are none."""
+        count = len(self.path.at)
+        if count + len(rows) > MOST_ROWS:
+            return self, f"between {count} rows {trouble}"
+        middle, found = self._on_targets(rows)
+        if found.all():
+            return self._with_rows(rows, middle), ""
+        place = describe_place(self.path.states[int(rows[np.argmin(found)])], self.actuators)
+        return self, f"no further row within the constraints is found behind {place}"
+
+    def _until(self, last: int) -> "BetweenRows":
+        """The rows up to one of them."""
+        path, kept = self.path, slice(0, last + 1)
+        end = Event(EventKind.CRITICAL, path.states[last], float(path.at[last]))
+        states, index = path.states[kept], path.index[kept]
+        shorter = Path(states, path.at[kept], path.length[kept], index, (end,))
+        return replace(self, path=shorter)
 
     def _means(self) -> tuple[Lanes, Parameters]:
         states = self.path.states

@@ -19,7 +19,7 @@ from equimorph.tasks.motion.course import (
     may_graze,
     shortest_change,
 )
-from equimorph.tasks.route import FINE
+from equimorph.tasks.straight_lines import FINE
 
 DENSE = 12
 """Legs from which on blocks of them are cheaper than one continuation each."""

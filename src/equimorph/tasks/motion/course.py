@@ -219,6 +219,8 @@ def may_graze(within: Sequence[Constraint], states: States) -> Flags:
     Between two values the curve bulges by an eighth of its curvature times the squared step; four
     times as much is doubted. A single step shows its curvature by the state half-way.
     """
+    if len(states) == 1:
+        return np.zeros(0, bool)
     if len(states) == 2:
         structure, mean = states.structure, [0.5 * (a[:1] + a[1:]) for a in (states.z, states.p)]
         z, good, _ = exact_states(structure, *mean)

@@ -24,12 +24,14 @@ from equimorph.tasks.motion.redundant import follow_redundant
 from equimorph.tasks.optimising.moving_optimum import MovingProblem, follow_minimum
 from equimorph.tasks.optimising.optimum_path import FollowedOptimum
 from equimorph.tasks.optimising.programme import Objective, stability
-from equimorph.tasks.route import FINE, describe_place, schedule_of
+from equimorph.tasks.route import describe_place, schedule_of
 from equimorph.tasks.start import Start, check_stable, start_state
+from equimorph.tasks.straight_lines import FINE, least_margin
 
 Failure = Literal[
-    "", "snap-through", "singular Jacobian", "actuator limit", "constraint", "accuracy", "lost"
-]
+    "", "snap-through", "singular Jacobian", "actuator limit", "constraint", "accuracy",
+    "straight lines", "lost",
+]  # fmt: skip
 REPEATED = 1e-8
 """Relative distance of targets that are the same."""
 CRITICAL = ("critical", "branch point", "index")
@@ -48,22 +50,22 @@ class Tracking:
         "snap-through": stability is lost. "singular Jacobian": the actuators cannot move the
         descriptors on (det S_a = 0). "actuator limit", "constraint": a bound is met. "accuracy":
         the rows meet the targets, but between them these are missed by more than was allowed,
-        however many rows are inserted. "lost": a numerical failure.
+        however many rows are inserted. "straight lines": the curve is stable, but not the straight
+        lines between rows, however close these are. "lost": a numerical failure.
     path
         Exact states up to the end of the motion; `path.at` counts legs, so that 1.5 is half-way
         through the second one.
     margin
         Smallest stability margin on the way.
     schedule
-        Parameters along the whole motion; None if it was refused. The motion is judged on its
-        curve; `verify` checks that straight lines between the rows keep it stable, too, which they
-        need not beside a fold.
+        Parameters along the whole motion; None if it was refused. Straight lines between its rows
+        keep the motion stable: further rows are inserted where they would not, as beside a fold.
     compromise
         Beyond the failure, if requested: the stable states with the least half sum of squared
         misses of the targets.
     between
         Largest misses of the targets, by name, half-way between the rows of the schedule, where
-        parameters move straight from row to row; infinite where no stable state was found there.
+        parameters move straight from row to row.
     """
 
     status: Literal["arrived", "refused"]
@@ -96,8 +98,11 @@ class Tracking:
 
     @cached_property
     def margin(self) -> float:
-        """Smallest stability margin on the way."""
-        return float(self.path.states.margin.min())
+        """Smallest stability margin on the way; with a schedule, between its rows, too."""
+        states = self.path.states
+        if self.schedule is None:
+            return float(states.margin.min())
+        return least_margin(states, states.margin).margin
 
     @property
     def states(self) -> States:
@@ -208,10 +213,14 @@ def track(  # the knobs of the public face, all by keyword
     monitored = tuple(dict.fromkeys((*asked, *(c.descriptor for c in within), *monitor)))
     rows, why = BetweenRows(path, legs, asked, names, (*within, *bounds)), ""
     if accuracy is not None:
+        failure = "accuracy"
         rows, why = rows.refined(accuracy)
+    if not why:
+        failure = "straight lines"
+        rows, why = rows.held()
     path, between = rows.path, rows.largest
     if why:
-        return Tracking("refused", "accuracy", why, path, asked, names, between=between)
+        return Tracking("refused", failure, why, path, asked, names, between=between)
     schedule = schedule_of(path, path.states.margin, monitored)
     return Tracking("arrived", "", "", path, asked, names, schedule, None, between)
 

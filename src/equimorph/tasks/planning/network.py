@@ -18,7 +18,8 @@ from equimorph.structures import State, States, Structure, join_states
 from equimorph.structures.margin import count_below
 from equimorph.structures.metric import metric_length
 from equimorph.tasks.planning.objectives import ROUGH, Objective, Wish, objective_of
-from equimorph.tasks.route import FINE
+from equimorph.tasks.start import critical
+from equimorph.tasks.straight_lines import FINE
 
 EXACT, RESERVES = (1.0, 0.0), ((1.01, 1e-3), (1.05, 1e-2), (1.15, 1e-2))
 """Factors on the demanded margin, and shares of the smaller margin of the ends added to it."""
@@ -271,7 +272,8 @@ def explain_no_route(eset: EquilibriumSet, ends: Ends, demands: Demands) -> str:
     pairs = np.concatenate([network.pairs[allowed[network.pairs].all(axis=1)], own])
     label = components(len(eset.points) + 2, pairs)
     if label[-1] != label[-2]:
-        return "start and goal lie on different stable components of the set"
+        why = critical("start", ends[0]) or critical("goal", ends[1])
+        return why or "start and goal lie on different stable components of the set"
     words = [str(constraint) for constraint in demands.constraints]
     words += [f"margin >= {demands.margin:g}"] if demands.margin > 0 else []
     return f"start and goal are connected by stable states, but not within {' and '.join(words)}"

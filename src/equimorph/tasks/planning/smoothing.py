@@ -12,7 +12,8 @@ from equimorph.equilibria import lift
 from equimorph.errors import InputError
 from equimorph.model import Constraint, Descriptor, Spline, names_of
 from equimorph.tasks.distances import distance
-from equimorph.tasks.route import FINE, Route, refusal, schedule_of
+from equimorph.tasks.route import Route, refusal, schedule_of
+from equimorph.tasks.straight_lines import FINE, leads_on, least_margin
 from equimorph.tolerances import SAME_STATE
 
 Places = Float[np.ndarray, "_ parameters"]
@@ -146,12 +147,15 @@ def _verify(
     if distance(path.end.state, route.path.end.state) > SAME_STATE:
         return refusal("it leads to another equilibrium", route.way_points, path)
     margins = path.states.margin
-    if margins.min() < margin or not (margins > 0.0).all():
-        return refusal(f"the margin falls to {margins.min():.4g}", route.way_points, path)
+    if not leads_on(path.states).all():
+        return refusal("straight lines between its rows lose stability", route.way_points, path)
+    least = least_margin(path.states, margins).margin
+    if least < margin or not (margins > 0.0).all():
+        return refusal(f"the margin falls to {least:.4g}", route.way_points, path)
     told = dict.fromkeys((*(c.descriptor for c in within), *monitor))
     schedule = schedule_of(path, margins, tuple(told))
     length = float(path.length[-1])
     return replace(
-        route, path=path, margin=float(margins.min()), length=length, schedule=schedule,
+        route, path=path, margin=least, length=length, schedule=schedule,
         cost=float("nan") if route.objective != "length" else length,
     )  # fmt: skip

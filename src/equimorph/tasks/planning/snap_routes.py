@@ -30,7 +30,8 @@ from equimorph.tasks.planning.straightening import (
     straight_corners,
     way_points_of,
 )
-from equimorph.tasks.route import FINE, Corners, Route, refusal, schedule_of
+from equimorph.tasks.route import Corners, Route, refusal, schedule_of
+from equimorph.tasks.straight_lines import FINE
 from equimorph.tolerances import SAME_STATE
 
 SAMPLES = 9

@@ -15,7 +15,8 @@ from equimorph.tasks.robustness.error_model import ErringStructure, Errors, Offs
 from equimorph.tasks.robustness.evidence import Status, Survival
 from equimorph.tasks.robustness.room import error_directions
 from equimorph.tasks.robustness.trials import Execution, TrialEnds, corner_rows
-from equimorph.tasks.route import FINE, describe_place
+from equimorph.tasks.route import describe_place
+from equimorph.tasks.straight_lines import FINE
 from equimorph.tasks.verification.evidence import ProofStatus
 from equimorph.tasks.verification.schedule_check import follow_polyline
 from equimorph.tasks.verification.tube import Tube, TubeProof

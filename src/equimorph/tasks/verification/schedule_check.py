@@ -8,14 +8,13 @@ from typing import Literal
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
-from equimorph.arrays import Flags, Float, Int
+from equimorph.arrays import Float, Int
 from equimorph.equilibria import (
     Event,
     Lifts,
     Path,
     TraceOptions,
     check_start,
-    lift,
     settle,
     way_points,
 )
@@ -24,18 +23,23 @@ from equimorph.model import Constraint, Descriptor, Schedule, names_of
 from equimorph.structures import State, States, Structure, from_identity, join_states
 from equimorph.structures.metric import metric_length
 from equimorph.tasks.distances import path_lengths
-from equimorph.tasks.route import FINE, describe_obstacle, describe_place, schedule_of
+from equimorph.tasks.route import describe_obstacle, describe_place, schedule_of
 from equimorph.tasks.start import check_schedule, inadmissible
+from equimorph.tasks.straight_lines import (
+    AT_GOAL,
+    FINE,
+    Least,
+    are_led,
+    are_there,
+    least_margin,
+    lift_straight,
+)
 from equimorph.tasks.verification.proof import Proof, prove
-from equimorph.tolerances import SAME_STATE
 
 NEAR = 0.05
 """Distance in the metric up to which a start that was written with few digits is corrected."""
 
 Rows = Float[np.ndarray, "rows parameters"]
-
-AT_GOAL = 1e-9
-"""Share of a leg that may be missing: steps that end at the goal but for round-off count."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,8 +68,9 @@ def follow_polyline(
     done, here = 0, start
     while done < len(rows):
         nodes = _by_newton(here, rows[done:])
-        lifts = _lift(nodes[:-1], nodes.p[1:], within, options)
-        good = _true(lifts, nodes[1:])
+        lifts = lift_straight(nodes[:-1], nodes.p[1:], within, options)
+        bad = np.flatnonzero(~are_led(lifts, nodes[1:]))
+        good = int(bad[0]) if len(bad) else len(lifts)
         legs.append(_part(nodes[0], lifts, good + 1, done))
         done += min(good + 1, len(nodes) - 1)
         here = legs[-1].end.state
@@ -88,24 +93,6 @@ def _by_newton(start: State, rows: Rows) -> States:
     return States(structure, np.array(z), np.concatenate([start.p[None], rows[: len(z) - 1]]))
 
 
-def _lift(states: States, to: Rows, within: tuple[Constraint, ...], options: TraceOptions) -> Lifts:
-    names = names_of(states.structure.parameters)
-    columns = {name: to[:, k].copy() for k, name in enumerate(names)}
-    return lift(states, columns, within=within, options=options)
-
-
-def _true(lifts: Lifts, goals: States) -> int:
-    """Number of legs, from the first on, whose lifts arrive at the goal."""
-    gap = metric_length(goals.structure, lifts.states.z - goals.z)
-    bad = np.flatnonzero(~_there(lifts) | (gap > SAME_STATE))
-    return int(bad[0]) if len(bad) else len(goals)
-
-
-def _there(lifts: Lifts) -> Flags:
-    """Which lifts came to their goals."""
-    return np.asarray(lifts.arrived | ((lifts.kind == "lost") & (lifts.at > 1.0 - AT_GOAL)))
-
-
 def _part(start: State, lifts: Lifts, legs: int, before: int) -> LiftedPolyline:
     """The first legs as one march."""
     legs = min(legs, len(lifts))
@@ -120,7 +107,7 @@ def _part(start: State, lifts: Lifts, legs: int, before: int) -> LiftedPolyline:
     both = (points.states[ours], lifts.states[:legs])
     corner = np.flatnonzero(order >= len(ours))
     end = lifts[legs - 1]
-    kind = "arrived" if _there(lifts)[legs - 1] else end.kind
+    kind = "arrived" if are_there(lifts)[legs - 1] else end.kind
     ended = Event(kind, end.state, before + legs - 1 + end.at, end.criticality, end.detail)
     states = join_states(start.structure, both)[order]
     return LiftedPolyline(states, before + (lane + at)[order], corner, ended)
@@ -179,10 +166,10 @@ class Verification:
         """Whether the schedule was verified."""
         return self.status == "verified"
 
-    @property
+    @cached_property
     def margin(self) -> float:
-        """Smallest stability margin at the states."""
-        return float(self.margins.min())
+        """Smallest stability margin on the way, also between the states."""
+        return least_margin(self.states, self.margins).margin
 
     @cached_property
     def path(self) -> Path:
@@ -330,18 +317,23 @@ def _violation(
     done: LiftedPolyline, margins: Float[np.ndarray, " points"], margin: float, legs: int
 ) -> tuple[str, int]:
     """First violation in words, and the number of the state; nothing for none."""
-    low = np.flatnonzero(margins < margin) if margin > 0.0 else np.flatnonzero(margins <= 0.0)
     # the end at a fold has no margin, but the report must name the fold
-    low = low[low < len(margins) - (done.end.kind != "arrived")]
-    names = _moved_names(done.states)
+    count = len(margins) - (done.end.kind != "arrived")
+    states, margins = done.states[:count], margins[:count]
+    low = np.flatnonzero((margins <= 0.0) | (margins < margin))
+    least, names = None, _moved_names(done.states)
     if len(low):
-        k = int(low[0])
-        where = describe_place(done.states[k], names)
-        return f"the stability margin falls to {margins[k]:.4g}, below {margin:g}, at {where}", k
+        least = Least(float(margins[low[0]]), states[int(low[0])], int(low[0]))
+    elif margin > 0.0:
+        least = least_margin(states, margins)
+    if least is not None and (len(low) or least.margin < margin):
+        where = describe_place(least.state, names)
+        fall = f"the stability margin falls to {least.margin:.4g}, below {margin:g}, at {where}"
+        return fall, least.number
     if done.end.kind == "arrived":
-        return "", len(margins) - 1
+        return "", len(done.at) - 1
     leg = min(int(done.end.at) + 1, legs)
-    return f"step {leg} of {legs} meets {describe_obstacle(done.end, names)}", len(margins) - 1
+    return f"step {leg} of {legs} meets {describe_obstacle(done.end, names)}", len(done.at) - 1
 
 
 def _moved_names(states: States) -> list[str]:

@@ -1,0 +1,135 @@
+"""What lies between states where parameters move straight from each to the next."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from equimorph.arrays import Flags, Float, Int, Parameters
+from equimorph.equilibria import Lifts, TraceOptions, lift
+from equimorph.manifold.lookup.exact_states import exact_states
+from equimorph.model import Constraint, names_of
+from equimorph.structures import State, States
+from equimorph.structures.metric import metric_length
+from equimorph.tolerances import SAME_STATE
+
+FINE = TraceOptions(largest_step=0.02, first_step=0.01, turning=0.05, steps=20000)
+"""Step control of the final check of every route."""
+AT_GOAL = 1e-9
+"""Share of a line that may be missing: steps that end at the goal but for round-off count."""
+
+GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
+ROUNDS = 16
+"""Sections of a bracket by the golden ratio: what is left of it is a 2200th, and the least value
+errs by the square of that."""
+DEEPER = 4.0
+"""How much deeper a dip may be than the parabola through the ends and the middle of a line."""
+HIGHER = 2.0
+"""Ratio to the least margin of both ends up to which a line may dip below it."""
+
+Places = Float[np.ndarray, " lines"]
+
+
+def lift_straight(
+    begin: States, to: Parameters, within: tuple[Constraint, ...] = (), options: TraceOptions = FINE
+) -> Lifts:
+    """Lift states along straight lines, each to its own parameters."""
+    columns = {name: to[:, k].copy() for k, name in enumerate(names_of(begin.structure.parameters))}
+    return lift(begin, columns, within=within, options=options)
+
+
+def are_there(lifts: Lifts) -> Flags:
+    """Which lifts came to their goals."""
+    return np.asarray(lifts.arrived | ((lifts.kind == "lost") & (lifts.at > 1.0 - AT_GOAL)))
+
+
+def are_led(lifts: Lifts, goals: States) -> Flags:
+    """Which lifts came to the states that were their goals."""
+    gap = metric_length(goals.structure, lifts.states.z - goals.z)
+    return np.asarray(are_there(lifts) & (gap <= SAME_STATE))
+
+
+def leads_on(states: States) -> Flags:
+    """Which straight lines lead from each state to the next one without a loss."""
+    return are_led(lift_straight(states[:-1], states.p[1:]), states[1:])
+
+
+def states_between(
+    states: States, lines: Int[np.ndarray, " lines"], shares: Places
+) -> tuple[States, Flags]:
+    """Stable states at shares of lines, by their numbers, and where there are any.
+
+    Newton's method from the line between both ends; beside folds, where it fails, lifts.
+    """
+    z, p = (
+        column[lines] + shares[:, None] * (column[lines + 1] - column[lines])
+        for column in (states.z, states.p)
+    )
+    z, good, index = exact_states(states.structure, z, p)
+    stable = good & (index == 0)
+    lost = np.flatnonzero(~stable)
+    if len(lost):
+        lifts = lift_straight(states[lines[lost]], p[lost])
+        z[lost], stable[lost] = lifts.states.z, are_there(lifts)
+    return States(states.structure, z, p), stable
+
+
+class Least(NamedTuple):
+    """Least margin, the state that has it, and the number of the last state before it."""
+
+    margin: float
+    state: State
+    number: int
+
+
+def least_margin(states: States, margins: Float[np.ndarray, " states"]) -> Least:
+    """Least margin where parameters move straight from state to state.
+
+    Every line may be a chord that dips towards a fold. Where its middle leaves a doubt, the least
+    is searched by golden section of exact states.
+    """
+    lowest = int(np.argmin(margins))
+    known = Least(float(margins[lowest]), states[lowest], lowest)
+    low = _doubtful(states, margins)
+    if not len(low):
+        return known
+    high = low + 1.0
+    inner = [high - GOLDEN * (high - low), low + GOLDEN * (high - low)]
+    values = [_margins(states, each)[0] for each in inner]
+    for _ in range(ROUNDS):
+        left = values[0] < values[1]
+        low, high = np.where(left, low, inner[0]), np.where(left, inner[1], high)
+        new = np.where(left, high - GOLDEN * (high - low), low + GOLDEN * (high - low))
+        found = _margins(states, new)[0]
+        inner = [np.where(left, new, inner[1]), np.where(left, inner[0], new)]
+        values = [np.where(left, found, values[1]), np.where(left, values[0], found)]
+    places = np.concatenate(inner)
+    every, between = _margins(states, places)
+    best = int(np.argmin(every))
+    if every[best] >= known.margin:
+        return known
+    return Least(float(every[best]), between[best], int(places[best]))
+
+
+def _doubtful(states: States, margins: Float[np.ndarray, " states"]) -> Places:
+    """Numbers of the lines along which the margin may fall below all values."""
+    least = margins.min()
+    lines = np.flatnonzero(
+        np.minimum(margins[:-1], margins[1:]) <= least + (HIGHER - 1) * abs(least)
+    )
+    first, last = margins[lines], margins[lines + 1]
+    middle = _margins(states, lines + 0.5)[0]
+    # the parabola a + slope s + bend s² over −½ ≤ s ≤ ½ around the middle
+    slope, bend = last - first, 2.0 * (first + last) - 4.0 * middle
+    inside = np.abs(slope) < DEEPER * np.abs(bend)
+    lowest = middle - DEEPER * slope**2 / (4.0 * np.maximum(bend, 1e-300))
+    low = np.where(inside & (bend > 0.0), np.minimum(lowest, middle), np.inf)
+    return np.asarray(lines[(low < least) | ~np.isfinite(middle)], float)
+
+
+def _margins(states: States, places: Places) -> tuple[Places, States]:
+    """Margins at places between states, and the states there; infinite where none is found."""
+    lines = np.minimum(places.astype(int), len(states) - 2)
+    between, stable = states_between(states, lines, places - lines)
+    margins = np.full(len(places), np.inf)
+    margins[stable] = between[np.flatnonzero(stable)].margin
+    return margins, between
