@@ -5,7 +5,7 @@ import pytest
 
 import equimorph as em
 from equimorph.errors import InputError
-from oracles.polynomial import fold_form, pitchfork_form
+from oracles.polynomial import Polynomial, fold_form, pitchfork_form
 
 
 @pytest.fixture(scope="module")
@@ -27,6 +27,40 @@ def test_branch_point_ends_a_rising_load_and_tells_its_criticality(sign, word):
     found = em.limit_load(pitchfork_form(sign).state(0.0, a=-1.0), "a")
     assert (found.kind, found.criticality) == ("branch point", word)
     assert found.value == pytest.approx(0.0, abs=1e-12)
+
+
+def loads_with_close_folds(lanes, distance, draw):
+    """States at x = 0 of loads P(x) with P' = k (b − x) Π ((x − a)² − d²/4), and the first folds.
+
+    One or two pairs of folds at a distance d stand before the fold b; y = m x² is slaved.
+    """
+    form = Polynomial(
+        lambda x, y, P, m, *c: (
+            sum(ck * x ** (k + 2) * (1 / (k + 2)) for k, ck in enumerate(c))
+            + (y - m * x**2) ** 2
+            - P * x
+        ),
+        2,
+        ("P", "m", *(f"c{k}" for k in range(6))),
+    )
+    p, first = np.zeros((lanes, 8)), np.zeros(lanes)
+    for lane in range(lanes):
+        a = np.cumsum(draw.uniform(0.3, 1.0, draw.integers(1, 3)))
+        roots = np.append(np.concatenate([a - 0.5 * distance, a + 0.5 * distance]), a[-1] + 1.0)
+        slope = -np.poly(roots)[::-1]
+        slope /= slope[0] * draw.uniform(0.3, 3.0)
+        p[lane, 2 : 2 + len(slope)] = slope / np.arange(1, len(slope) + 1)
+        p[lane, 1], first[lane] = draw.normal(), roots.min()
+    return em.States(form, np.zeros((lanes, 2)), p), first
+
+
+@pytest.mark.parametrize("distance", [0.1, 0.03, 0.01, 0.003])
+def test_of_three_folds_inside_one_step_the_first_is_the_limit(distance):
+    """575 of 18 000 such loads went past a pair of folds to the next one without a word."""
+    states, first = loads_with_close_folds(400, distance, np.random.default_rng(8))
+    found = em.limit_load(states, "P")
+    assert (found.kind == "fold").all()
+    assert found.states.z[:, 0] == pytest.approx(first, abs=1e-6)
 
 
 def test_constraint_ends_a_rising_load_and_is_named():

@@ -82,9 +82,11 @@ two events; below which it is searched for them; length from which on it is refu
 EARLY_NEAR, EARLY_DIP = 0.3, 0.5
 """Determinant at a start, and least one inside a first step, as shares of those at its ends, below
 which the step is searched: what came before it is not known."""
-SMALL = 0.02
-"""Determinant at the end of a step over that at its start below which the index of a point that is
-as far away as the last correction may be another one."""
+SMALL, FAINT = 0.02, 1e-3
+"""Determinant at the end of a step over that at its start, or in units of that at the start of the
+lane, below which the index of a point as far away as the last correction may be another one."""
+SLIGHT = 1e-3
+"""Share of a step by which a fold inside is at least taken to be away from its ends."""
 SLACK = 0.01
 """Slope of t that is no turn inside such a short step, as a share of those at its ends."""
 ROUND_OFF = 1e-14
@@ -266,14 +268,16 @@ def judge(index, determinant, numbers, counts, active, smallest, locates, plain)
         hidden = reach >= 1.0 if old > 0.0 else reach <= 0.0
         hidden = (hidden or (what & (ARRIVAL | RETURN)) != 0) and length > 10 * smallest
         bad = changed > 1 or (flipped and hidden) or _turns_twice(old, new, end - start, length)
-        bad = bad or (length > WIDE and changed == 0 and _dips(i, DIP, numbers))
+        if plain and length > WIDE:
+            bad = bad or (fold and _hides_pair(i, numbers))
+            bad = bad or (changed == 0 and _dips(*_trio(i, numbers), DIP))
         bad = bad or (locates and length > BROAD and (what & BRANCH) != 0)
         if bad or (flipped and not fold and not locates):
             counts[STAGE, i] = REFUSED
             continue
         good += 1
         doubtful += (what & BRANCH) != 0
-        if changed == 0 and plain and (_dips(i, NEAR, numbers) or _passed_least(i, numbers)):
+        if changed == 0 and plain and _is_close(i, numbers):
             counts[WHAT, i] |= HIDDEN
             close += 1
         if plain and numbers[TRAVELLED, i] <= numbers[ARC, i] and _hides_early(i, numbers):
@@ -291,8 +295,8 @@ def _in_units(i, determinant, numbers):
 
 @njit(**INLINE)
 def _is_small(i, numbers):
-    """Whether the determinant at the end of a step is much smaller than at its start."""
-    return abs(numbers[NEW_DET, i]) < SMALL * abs(numbers[DET, i])
+    """Whether the determinant at the end of a step is much smaller than before."""
+    return abs(numbers[NEW_DET, i]) < max(SMALL * abs(numbers[DET, i]), FAINT)
 
 
 @njit(**INLINE)
@@ -323,43 +327,75 @@ def _turns_twice(old, new, gain, length):
 
 
 @njit(**INLINE)
-def _parabola(i, numbers):
-    """Slope here, and half the curvature, of the determinant's size, by its last three values."""
-    before, length, sign = numbers[ARC, i], numbers[LENGTH, i], np.sign(numbers[DET, i])
-    here = sign * numbers[DET, i]
-    rise = (here - sign * numbers[DET_OLD, i]) / before
-    bow = ((sign * numbers[NEW_DET, i] - here) / length - rise) / (before + length)
+def _parabola(before, length, last, here, there):
+    """Slope at the second of three places, and half the curvature, of a parabola."""
+    rise = (here - last) / before
+    bow = ((there - here) / length - rise) / (before + length)
     return rise + bow * before, bow
 
 
 @njit(**INLINE)
-def _dips(i, share, numbers):
-    """Whether the determinant may touch zero, or cross it twice, inside a step."""
-    here, there, length = numbers[DET, i], numbers[NEW_DET, i], numbers[LENGTH, i]
-    if not (numbers[ARC, i] > 0.0 and here * there > 0.0):
+def _trio(i, numbers):
+    """Lengths of the last two steps; the determinant at their ends, not negative between them."""
+    last, here, there = numbers[DET_OLD, i], numbers[DET, i], numbers[NEW_DET, i]
+    sign = 1.0 if here >= 0.0 else -1.0
+    return numbers[ARC, i], numbers[LENGTH, i], sign * last, sign * here, sign * there
+
+
+@njit(**INLINE)
+def _beside_fold(i, numbers):
+    """`_trio` with sizes divided by the distance from the fold in the step: of one sign, too.
+
+    The fold is where the cubic through both ends and slopes of t turns.
+    """
+    before, length, last, here, there = _trio(i, numbers)
+    a, b = numbers[SLOPE, i], numbers[NEW_SLOPE, i]
+    rise = (numbers[TRIAL, i] - numbers[T, i]) / length
+    bend, bow = 3 * rise - 2 * a - b, a + b - 2 * rise
+    under = np.sqrt(max(bend * bend - 3 * bow * a, 0.0))
+    share = min(max(a / (np.sign(a) * under - bend), SLIGHT), 1.0 - SLIGHT)
+    return before, length, last / (share + before / length), here / share, there / (share - 1.0)
+
+
+@njit(**INLINE)
+def _dips(before, length, last, here, there, share):
+    """Whether what has such sizes may touch zero, or cross it twice, inside the last step."""
+    if not (before > 0.0 and here * there > 0.0):
         return False
-    slope, bow = _parabola(i, numbers)
+    slope, bow = _parabola(before, length, last, here, there)
     # the least value lies inside if the parabola falls at the start and rises at the end
     if not (slope < 0.0 and slope + 2.0 * bow * length > 0.0):
         return False
-    here, there = abs(here), abs(there)
     return here - slope * slope / (4.0 * bow) < share * min(here, there)
 
 
 @njit(**INLINE)
-def _passed_least(i, numbers):
-    """Whether the determinant may touch zero, or cross it twice, just before or after this place.
+def _passed_least(before, length, last, here, there):
+    """Whether it may touch zero, or cross it twice, just before or after the second place.
 
     It is much smaller here than one step before and at the end, or the parabola is least in the
     step before, which the end of that did not show.
     """
-    last, here, there = numbers[DET_OLD, i], numbers[DET, i], numbers[NEW_DET, i]
-    if not (numbers[ARC, i] > 0.0 and last * there > 0.0):
+    if not (before > 0.0 and last * there > 0.0):
         return False
-    slope, bow = _parabola(i, numbers)
-    inside = slope > 0.0 and slope < 2.0 * bow * numbers[ARC, i]
-    least = abs(here) - slope * slope / (4.0 * bow) if inside else abs(here)
+    slope, bow = _parabola(before, length, last, here, there)
+    inside = slope > 0.0 and slope < 2.0 * bow * before
+    least = here - slope * slope / (4.0 * bow) if inside else here
     return least < NEAR * min(abs(last), abs(there))
+
+
+@njit(**INLINE)
+def _is_close(i, numbers):
+    """Whether two zeros of the determinant may hide in a step that shows none, or before it."""
+    trio = _trio(i, numbers)
+    return _dips(*trio, NEAR) or _passed_least(*trio)
+
+
+@njit(**INLINE)
+def _hides_pair(i, numbers):
+    """Whether two more zeros of the determinant may hide in a step over a fold, or before it."""
+    trio = _beside_fold(i, numbers)
+    return _dips(*trio, 1.0) or _passed_least(*trio)
 
 
 @njit(**INLINE)
@@ -371,7 +407,7 @@ def _hides_early(i, numbers):
     start, here = abs(start), abs(here)
     if start < EARLY_NEAR * here:
         return True
-    slope, bow = _parabola(i, numbers)
+    slope, bow = _parabola(*_trio(i, numbers))
     slope -= 2.0 * bow * before
     if not (slope < 0.0 and slope + 2.0 * bow * before > 0.0):
         return False
