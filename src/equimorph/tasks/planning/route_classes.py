@@ -28,7 +28,7 @@ from equimorph.tasks.planning.network import (
     network_of,
     nodes_with_ends,
 )
-from equimorph.tasks.planning.objectives import Wish
+from equimorph.tasks.planning.objectives import ROUGH, Wish
 from equimorph.tasks.planning.straightening import (
     chain_cost,
     check_ends,
@@ -43,9 +43,10 @@ from equimorph.tasks.start import check_two_parameters
 
 MOST_TURNS = 2
 """How often a path may pass around one hole."""
-SPARE, UNSURE = 2, 1.15
+SPARE, UNSURE = 6, 1.15
 """Further classes whose best paths over the mesh are straightened, too, and up to which ratio of
-costs: ways over the mesh are too long by different amounts, and may come in another order."""
+costs: ways over edges and diagonals of a grid of squares are too long by up to 8 %, and may come in
+another order."""
 LABELS = 8
 """Classes that are kept at a vertex, for each requested route."""
 
@@ -109,8 +110,7 @@ def alternatives(
     best, failed = list[Route](), list[Route]()
     for tightened in demands.with_reserves(min(end.margin for end in ends)):
         classes = _Classes(eset, order_ends(ends), tightened)
-        paths = classes.paths(count + SPARE)
-        rough = np.array([chain_cost(each, tightened) for each in paths])
+        paths, rough = classes.paths(count + SPARE)
         most = np.sort(rough)[:count].max(initial=0.0)
         paths = [each for each, cost in zip(paths, rough, strict=True) if cost <= UNSURE * most]
         corners = straight_corners(eset, paths, tightened, same_class=True)
@@ -132,6 +132,10 @@ def alternatives(
     return tuple(sorted(best, key=lambda route: route.cost)[:count]) or (failed[0],)
 
 
+Triangles = Int[np.ndarray, "triangles 3"]
+Values = Int[np.ndarray, "edges holes"]
+
+
 @dataclass(frozen=True)
 class _Graph:
     """Links with costs and the cocycles along them, from the first node to the second."""
@@ -139,6 +143,44 @@ class _Graph:
     pairs: Edges
     costs: Float[np.ndarray, " links"]
     values: Int[np.ndarray, "links holes"]
+
+
+@dataclass(frozen=True)
+class _Diagonals:
+    """Links across edges between two triangles: from the third vertex of one to that of the other.
+
+    They lead over the two edges `over`, which meet at a vertex `via`.
+    """
+
+    pairs: Edges
+    via: Int[np.ndarray, " diagonals"]
+    over: Int[np.ndarray, "diagonals 2"]
+    values: Int[np.ndarray, "diagonals holes"]
+
+    @classmethod
+    def of(cls, count: int, edges: Edges, triangles: Triangles, values: Values) -> "_Diagonals":
+        """Those of a surface; vertices of edges and triangles are in growing order."""
+        a, b, c = triangles.T
+        first, second, third = _sides(count, edges, triangles).T
+        # from the lower end of each side to the vertex opposite: over which side, and its sign
+        side, over = np.concatenate([first, second, third]), np.concatenate([third, first, first])
+        low, far = np.concatenate([a, b, a]), np.concatenate([c, a, b])
+        sign = np.repeat([1, -1, 1], len(triangles))
+        order = np.argsort(side, kind="stable")
+        pair = order[:-1][side[order[:-1]] == side[order[1:]]]
+        other = order[1:][side[order[:-1]] == side[order[1:]]]
+        change = sign[other, None] * values[over[other]] - sign[pair, None] * values[over[pair]]
+        back = far[pair] > far[other]
+        pairs = np.sort(np.stack([far[pair], far[other]], axis=1), axis=1)
+        change[back] *= -1
+        return cls(pairs, low[pair], np.stack([over[pair], over[other]], axis=1), change)
+
+    def over_edges(self, path: Int[np.ndarray, " n"], nodes: int) -> Int[np.ndarray, " m"]:
+        """A path with the vertices by which its diagonals lead."""
+        steps = np.sort(np.stack([path[:-1], path[1:]], axis=1), axis=1)
+        at = places_among(steps, self.pairs, nodes)
+        some = np.flatnonzero(at >= 0)
+        return np.insert(path, some + 1, self.via[at[some]])
 
 
 class _Classes:
@@ -157,8 +199,9 @@ class _Classes:
         self.inner = np.flatnonzero(allowed[network.pairs].all(axis=1))
         pairs = np.sort(network.pairs[self.inner], axis=1)
 
+        triangles = np.sort(network.cells[allowed[network.cells].all(axis=1)], axis=1)
+
         def values_of() -> Values:
-            triangles = np.sort(network.cells[allowed[network.cells].all(axis=1)], axis=1)
             return cocycles(len(eset.points), pairs, triangles)
 
         key = "cocycles", demands.constraints, demands.margin
@@ -167,25 +210,34 @@ class _Classes:
         own_values, known = _own_values(own, pairs, values, len(eset.points))
         self.direct = float(own_costs[~known].min(initial=np.inf))
         own, own_costs, own_values = own[known], own_costs[known], own_values[known]
+        self.across = across = _Diagonals.of(len(eset.points), pairs, triangles, values)
+        costs = network.costs(eset, demands.objective)[self.inner]
+        far = demands.objective.costs(eset.points, *across.pairs.T, ROUGH)
         self.graph = _Graph(
-            np.concatenate([pairs, own]),
-            np.concatenate([network.costs(eset, demands.objective)[self.inner], own_costs]),
-            np.concatenate([values, own_values]),
+            np.concatenate([pairs, across.pairs, own]),
+            np.concatenate([costs, far, own_costs]),
+            np.concatenate([values, across.values, own_values]),
         )
 
-    def paths(self, count: int) -> list[States]:
-        """States along the best paths of up to `count` classes; all their links can be lifted."""
+    def paths(self, count: int) -> tuple[list[States], Float[np.ndarray, " paths"]]:
+        """States along the best paths of up to `count` classes, and costs with cut corners.
+
+        All links can be lifted; diagonals are left over two edges.
+        """
         while True:
-            paths = self._search(count)
+            short = self._search(count)
+            paths = [self.across.over_edges(path, len(self.states)) for path in short]
             used = self.network.links_of(paths)
             if self.network.lift_links(used, self.states, self.demands):
-                return [self.states[path] for path in paths]
+                costs = [chain_cost(self.states[path], self.demands) for path in short]
+                return [self.states[path] for path in paths], np.array(costs)
 
     def _search(self, count: int) -> list[Int[np.ndarray, " n"]]:
         """Paths of the best classes, by Dijkstra's algorithm on (vertex, class)."""
         graph, nodes = self.graph, len(self.states)
-        good = np.ones(len(graph.pairs), bool)
-        good[: len(self.inner)] = ~self.broken[self.inner]
+        good, broken = np.ones(len(graph.pairs), bool), self.broken[self.inner]
+        good[: len(broken)] = ~broken
+        good[len(broken) :][: len(self.across.via)] = ~broken[self.across.over].any(axis=1)
         pairs, costs, values = graph.pairs[good], graph.costs[good], graph.values[good]
         both = np.concatenate([pairs, pairs[:, ::-1]])
         order = np.argsort(both[:, 0], kind="stable")
@@ -248,10 +300,6 @@ def _own_values(
     return out, fixed
 
 
-Triangles = Int[np.ndarray, "triangles 3"]
-Values = Int[np.ndarray, "edges holes"]
-
-
 @dataclass(frozen=True)
 class _Surface:
     """Sorted edges and triangles, and the edges of each triangle: ab, bc, ac of a < b < c."""
@@ -268,9 +316,7 @@ def cocycles(count: int, edges: Edges, triangles: Triangles) -> Values:
     for [EricksonWhittlesey2005]_; the edges in neither tree generate. Vertices of edges and
     triangles are in growing order; at most two triangles are at an edge.
     """
-    sides = np.stack([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [0, 2]]], axis=1)
-    places = places_among(sides.reshape(-1, 2), edges, count).reshape(-1, 3)
-    surface = _Surface(edges, triangles, places)
+    surface = _Surface(edges, triangles, _sides(count, edges, triangles))
     tree = _spanning(count, edges)
     parent, depth = _dual_tree(surface, tree)
     determined = np.zeros(len(edges), bool)
@@ -287,6 +333,12 @@ def cocycles(count: int, edges: Edges, triangles: Triangles) -> Values:
         total = np.einsum("ts,tsh->th", signs[level], values[surface.sides[level]])
         values[parent[level]] = -sense[level, None] * total
     return values[:, np.abs(values).max(axis=0, initial=0) > 0]
+
+
+def _sides(count: int, edges: Edges, triangles: Triangles) -> Int[np.ndarray, "triangles 3"]:
+    """Edges ab, bc, ac of each triangle a < b < c."""
+    sides = np.stack([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [0, 2]]], axis=1)
+    return places_among(sides.reshape(-1, 2), edges, count).reshape(-1, 3)
 
 
 def _spanning(count: int, edges: Edges) -> Bool[np.ndarray, " edges"]:
