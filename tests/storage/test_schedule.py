@@ -280,3 +280,40 @@ def test_wrong_trajectories_are_refused(schedule: Schedule, motion: Schedule, tm
         trajectory_message(motion, {"theta": "a"})
     with pytest.raises(InputError, match=r"`path` must end in \.yaml, \.yml or \.json"):
         write_trajectory(motion, tmp_path / "motion.txt")
+
+
+@pytest.mark.parametrize("name", ["table.csv", "alone.json"])
+@pytest.mark.parametrize(
+    "descriptors",
+    [
+        {"x (m)": ""},
+        {"y": "m", "y (m)": ""},
+        {"F": "", "F (descriptor)": ""},
+        {"F (descriptor)": "", "F": "N"},
+        {"x rate": "m/s", "time (s)": "1"},
+        {'a, "b"': "", "c\nd": "κ²", "": "", "=1+1": ""},
+    ],
+)
+def test_names_that_look_like_other_heads_come_back(tmp_path: Path, name: str, descriptors):
+    """136 of 5 588 schedules with such names came back with other numbers, 171 as a KeyError."""
+    rng = np.random.default_rng(1)
+    schedule = Schedule(
+        names=("F", "x", "time"),
+        roles=("load", "actuator", "actuator"),
+        units=("N", "m", "s"),
+        values=rng.normal(size=(3, 3)),
+        progress=np.linspace(0.0, 1.0, 3),
+        margins=rng.uniform(size=3),
+        descriptors={each: rng.normal(size=3) for each in descriptors},
+        start={"structure": None, "unknowns": [0.1]},
+        times=np.array([0.0, 0.5, 2.0]),
+        velocities=rng.normal(size=(3, 3)),
+        time_unit="s",
+        descriptor_units=descriptors,
+    )
+    back = read_schedule(write_schedule(schedule, tmp_path / name)[-1 if "json" in name else 0])
+    for field in ("values", "times", "velocities"):
+        np.testing.assert_array_equal(getattr(back, field), getattr(schedule, field))
+    assert list(back.descriptors) == list(descriptors)
+    for each, values in schedule.descriptors.items():
+        np.testing.assert_array_equal(back.descriptors[each], values)

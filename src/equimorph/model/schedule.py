@@ -1,6 +1,6 @@
 """Rates at which parameters may move, and schedules of actuators."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Protocol, runtime_checkable
@@ -11,7 +11,7 @@ from scipy.interpolate import BPoly
 from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Bool, Float, Int
 from equimorph.errors import InputError, MissingError
-from equimorph.tables import Table, Tabular
+from equimorph.tables import Table, Tabular, heading
 
 
 @runtime_checkable
@@ -109,10 +109,36 @@ DERIVATIVES = (("velocities", "rate", ""), ("accelerations", "acceleration", "²
 """Fields of a schedule, how their columns are called, and the power of the time in their units."""
 
 
-def column_of(descriptor: str, parameters: Sequence[str]) -> str:
-    """Name of a descriptor's column, other than those of all others: ``F (descriptor)``."""
-    taken = descriptor in (*parameters, PROGRESS, MARGIN, TIME)
-    return f"{descriptor} (descriptor)" if taken else descriptor
+Shown = tuple[str, str]
+"""What a column shows: "parameter", "descriptor" or a field of `DERIVATIVES`; and of what, by
+name."""
+
+
+def columns_of(
+    parameters: Mapping[str, str], descriptors: Mapping[str, str], time_unit: str
+) -> dict[Shown, tuple[str, str]]:
+    """Names and units of the columns of a schedule's table by what they show.
+
+    No two have the same name or head, whatever the parameters and descriptors, given with their
+    units, are called: that of a descriptor F beside a parameter F is ``F (descriptor)``.
+    """
+    taken = {TIME, heading(TIME, time_unit), PROGRESS, MARGIN}
+    columns: dict[Shown, tuple[str, str]] = {}
+
+    def add(shown: Shown, name: str, unit: str, kind: str) -> None:
+        while name in taken or heading(name, unit) in taken:
+            name = f"{name} ({kind})"
+        taken.update((name, heading(name, unit)))
+        columns[shown] = name, unit
+
+    for name, unit in parameters.items():
+        add(("parameter", name), name, unit, "parameter")
+    for key, word, power in DERIVATIVES:
+        for name, unit in parameters.items():
+            add((key, name), f"{name} {word}", f"{unit or '1'}/{time_unit}{power}", word)
+    for name, unit in descriptors.items():
+        add(("descriptor", name), name, unit, "descriptor")
+    return columns
 
 
 Instants = float | Float[np.ndarray, "*instants"]
@@ -207,20 +233,22 @@ class Schedule(Tabular):
 
         Rates and accelerations are there if the schedule has them.
         """
-        columns: dict[str, Float[np.ndarray, " steps"]] = {}
-        units = dict(zip(self.names, self.units, strict=True)) | {TIME: self.time_unit}
-        if self.times is not None:
-            columns[TIME] = self.times
-        columns |= {PROGRESS: self.progress, **self.parameters, MARGIN: self.margins}
-        for name, each in self.descriptors.items():
-            columns[column_of(name, self.names)] = each
-            units[column_of(name, self.names)] = self.descriptor_units.get(name, "")
-        for key, word, power in DERIVATIVES:
+        named = columns_of(
+            dict(zip(self.names, self.units, strict=True)),
+            {name: self.descriptor_units.get(name, "") for name in self.descriptors},
+            self.time_unit,
+        )
+        columns = {} if self.times is None else {TIME: self.times}
+        columns[PROGRESS] = self.progress
+        columns |= {named["parameter", name][0]: each for name, each in self.parameters.items()}
+        columns[MARGIN] = self.margins
+        columns |= {named["descriptor", name][0]: each for name, each in self.descriptors.items()}
+        for key, *_ in DERIVATIVES:
             rates = getattr(self, key)
             for k, name in enumerate(self.names):
                 if rates is not None and name in self.moving:
-                    columns[f"{name} {word}"] = rates[:, k]
-                    units[f"{name} {word}"] = f"{self.units[k] or '1'}/{self.time_unit}{power}"
+                    columns[named[key, name][0]] = rates[:, k]
+        units = {TIME: self.time_unit, **dict(named.values())}
         return Table(columns, units)
 
     @check_arguments

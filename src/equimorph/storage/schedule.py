@@ -25,7 +25,7 @@ from equimorph.arrays import Float
 from equimorph.equilibria import Event, Path as StatePath
 from equimorph.errors import InputError
 from equimorph.model import Schedule
-from equimorph.model.schedule import DERIVATIVES, MARGIN, PROGRESS, TIME, column_of
+from equimorph.model.schedule import DERIVATIVES, MARGIN, PROGRESS, TIME, columns_of
 from equimorph.storage.files import read_text, write_csv, write_text
 from equimorph.storage.hdf import get, get_json, put, put_coordinate, put_json, put_parameters
 from equimorph.storage.owner import Owner
@@ -120,17 +120,24 @@ def read_schedule(path: str | Path) -> Schedule:
 def _schedule(sidecar: dict[str, Any], columns: dict[str, Column]) -> Schedule:
     """Schedule of the columns of a table, by their headers."""
     names, units = tuple(sidecar["names"]), tuple(sidecar["units"])
-    plain = sidecar["version"] == 1
     unit, units_too = sidecar.get("time_unit", "T"), sidecar.get(DESCRIPTOR_UNITS, {})
-    heads = names if plain else list(map(heading, names, units))
-    values = np.column_stack([columns[head] for head in heads])
-    moments = {}
-    for key, word, power in DERIVATIVES:
+    descriptors = {name: units_too.get(name, "") for name in sidecar["descriptors"]}
+    named = columns_of(dict(zip(names, units, strict=True)), descriptors, unit)
+
+    def column(kind: str, name: str) -> Column:
+        own, unit = named[kind, name]
+        # files of older releases give columns of one name the same head, or heads without units
+        for head in (heading(own, unit), heading(name, unit), name):
+            if head in columns:
+                return columns[head]
+        raise InputError(f"`path` must be a table with a column {own!r}; got none.")
+
+    values = np.column_stack([column("parameter", name) for name in names])
+    moments, still = {}, np.zeros(len(values))
+    for key, *_ in DERIVATIVES:
         if key in sidecar.get("derivatives", ()):
-            moments[key] = np.zeros_like(values)
-            for k, name in enumerate(names):
-                head = heading(f"{name} {word}", f"{units[k] or '1'}/{unit}{power}")
-                moments[key][:, k] = columns.get(head, 0.0)
+            heads = [heading(*named[key, name]) for name in names]
+            moments[key] = np.column_stack([columns.get(head, still) for head in heads])
     return Schedule(
         names=names,
         roles=tuple(sidecar["roles"]),
@@ -138,10 +145,7 @@ def _schedule(sidecar: dict[str, Any], columns: dict[str, Column]) -> Schedule:
         values=values,
         progress=columns[PROGRESS],
         margins=columns[MARGIN],
-        descriptors={
-            name: _descriptor(name, units_too.get(name, ""), names, columns)
-            for name in sidecar["descriptors"]
-        },
+        descriptors={name: column("descriptor", name) for name in descriptors},
         start=sidecar["start"],
         way_points=np.array(sidecar["way_points"], dtype=int),
         times=columns.get(heading(TIME, unit)),
@@ -149,14 +153,6 @@ def _schedule(sidecar: dict[str, Any], columns: dict[str, Column]) -> Schedule:
         descriptor_units=units_too,
         **moments,
     )
-
-
-def _descriptor(
-    name: str, unit: str, parameters: tuple[str, ...], columns: dict[str, Column]
-) -> Column:
-    """Column of a descriptor; files of 0.1 give it the name of a parameter, too."""
-    head = heading(column_of(name, parameters), unit)
-    return columns[head if head in columns else name]
 
 
 def _paths(path: str | Path) -> tuple[Path | None, Path]:
