@@ -212,7 +212,8 @@ class _Classes:
         own, own_costs, own_values = own[known], own_costs[known], own_values[known]
         self.across = across = _Diagonals.of(len(eset.points), pairs, triangles, values)
         costs = network.costs(eset, demands.objective)[self.inner]
-        far = demands.objective.costs(eset.points, *across.pairs.T, ROUGH)
+        first, second = across.pairs.T
+        far = demands.objective.costs(eset.points, first, second, ROUGH)
         self.graph = _Graph(
             np.concatenate([pairs, across.pairs, own]),
             np.concatenate([costs, far, own_costs]),
