@@ -91,7 +91,7 @@ def inadmissible(
 
 
 def critical(name: str, state: State) -> str:
-    """Words for a start or goal that is no further from its next state than from itself."""
+    """Words for a start or goal on a fold or branch point, nearer than states are told apart."""
     apart = soft_modes(state.structure, state.z[None], state.p[None]).own_length[0]
     if apart > SAME_STATE:
         return ""

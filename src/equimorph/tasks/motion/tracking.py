@@ -60,6 +60,7 @@ class Tracking:
     schedule
         Parameters along the whole motion; None if it was refused. Straight lines between its rows
         keep the motion stable: further rows are inserted where they would not, as beside a fold.
+        Constraints hold on the curve, on the straight lines but for how far these leave it.
     compromise
         Beyond the failure, if requested: the stable states with the least half sum of squared
         misses of the targets.
