@@ -10,7 +10,7 @@ from equimorph.equilibria.curves import Curve
 from equimorph.equilibria.locate import hermite
 from equimorph.equilibria.steps import Bracket
 from equimorph.linalg.determinants import in_units
-from equimorph.marching.kernels import EARLY_DIP, EARLY_NEAR
+from equimorph.marching.judgement_kernels import EARLY_DIP, EARLY_NEAR
 from equimorph.structures import Structure
 
 Values = Float[np.ndarray, " points"]

@@ -18,6 +18,7 @@ from equimorph.equilibria.steps import IN_CACHE, Front, Line, Workspace, compile
 from equimorph.equilibria.trace_options import TraceOptions
 from equimorph.errors import InputError
 from equimorph.marching import kernels, tick_kernels as ticks
+from equimorph.marching.judgement_kernels import judge
 from equimorph.marching.kernels import ARRIVAL, CONVERGED, ENDED, RETURN, STARTING
 from equimorph.model import Constraint
 from equimorph.structures.contract import CompiledSteps
@@ -182,7 +183,7 @@ class Block:
         ends = (move.dz, move.tangent_z, move.tangent_t, mass, places)
         kernels.correct_arrivals(*ends, *scalars, active)
         locates, plain = self._rules[1:3]
-        _, doubtful, close = kernels.judge(
+        _, doubtful, close = judge(
             move.index, move.determinant, *scalars, active, smallest, locates, plain
         )
         if self._measure() or (locates and doubtful + close):

@@ -17,6 +17,7 @@ from equimorph.equilibria.rows import Rows
 from equimorph.equilibria.steps import least_inside
 from equimorph.equilibria.trace_options import EventCode, TraceOptions
 from equimorph.marching import kernels
+from equimorph.marching.judgement_kernels import NEAR
 from equimorph.marching.kernels import BRANCH, CONVERGED, EARLY, ENDING, HIDDEN, REFUSED
 from equimorph.model import Constraint
 from equimorph.structures import Advance
@@ -148,7 +149,7 @@ class RareSteps:
         last, here = np.abs(numbers[[kernels.DET_OLD, kernels.DET]])
         rise = (here - last) * numbers[kernels.LENGTH] ** 2
         rise += (there - here) * numbers[kernels.ARC] ** 2
-        low = (rows.counts[kernels.KNOWN, at] > 0) & ((here < kernels.NEAR * there) | (rise > 0.0))
+        low = (rows.counts[kernels.KNOWN, at] > 0) & ((here < NEAR * there) | (rise > 0.0))
         turn = numbers[kernels.BEND] * numbers[kernels.ARC]
         behind = start - numbers[kernels.ARC] * np.sinc(turn / np.pi)
         before = bracket.before.with_rows(np.flatnonzero(low), rows.front(at[low], back=1))

@@ -10,6 +10,7 @@ from equimorph.linalg.compiled import njit, template
 from equimorph.linalg.kernels import FLAGS
 from equimorph.linalg.simd import LANES
 from equimorph.marching.event_kernels import file_events, file_points
+from equimorph.marching.judgement_kernels import judge
 from equimorph.marching.kernels import (
     ACCEPTED,
     ARC,
@@ -33,7 +34,6 @@ from equimorph.marching.kernels import (
     close_gaps,
     correct,
     correct_arrivals,
-    judge,
 )
 from equimorph.marching.step_kernels import enter, proceed
 

@@ -28,7 +28,8 @@ from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.lifting.edges import LONGEST, correct_ends, trace_rays
 from equimorph.manifold.lifting.kernels import flag_first_of_alike, match_rays
 from equimorph.manifold.lifting.pairing import Pairing, RayMark, Rays
-from equimorph.marching.kernels import EARLY_DIP, LEAST_COSINE, MULTIPLIER_WEIGHT
+from equimorph.marching.judgement_kernels import EARLY_DIP
+from equimorph.marching.kernels import LEAST_COSINE, MULTIPLIER_WEIGHT
 from equimorph.model import Progress, are_feasible
 from equimorph.tolerances import SAME_STATE
 
