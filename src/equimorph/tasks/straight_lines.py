@@ -113,9 +113,8 @@ def least_margin(states: States, margins: Float[np.ndarray, " states"]) -> Least
 def _doubtful(states: States, margins: Float[np.ndarray, " states"]) -> Places:
     """Numbers of the lines along which the margin may fall below all values."""
     least = margins.min()
-    lines = np.flatnonzero(
-        np.minimum(margins[:-1], margins[1:]) <= least + (HIGHER - 1) * abs(least)
-    )
+    low = np.minimum(margins[:-1], margins[1:]) <= least + (HIGHER - 1) * abs(least)
+    lines = np.flatnonzero(low & (states.p[1:] != states.p[:-1]).any(axis=1))
     first, last = margins[lines], margins[lines + 1]
     middle = _margins(states, lines + 0.5)[0]
     # the parabola a + slope s + bend s² over −½ ≤ s ≤ ½ around the middle

@@ -44,6 +44,16 @@ def test_schedule_read_from_files_is_verified(tmp_path, schedule):
     assert found.margin == pytest.approx(0.462, abs=5e-4)
 
 
+def test_a_schedule_along_folds_is_refused_where_it_begins():
+    """With no margin demanded the flattest spring stays on its folds."""
+    spring = em.Spring()
+    start = em.lift(spring.natural_state(x_l=0.8), {"F": 0.01}).end.state
+    flattest = em.follow_optimum(start, spring.angle, {"F": 0.03}, actuators={"x_l": (0.6, 1.0)})
+    done = verify(flattest.schedule)
+    assert done.why == "the start lies on a fold or branch point, where stability is lost"
+    assert done.margin == pytest.approx(0.0, abs=1e-3)
+
+
 def test_start_written_with_few_digits_is_corrected(schedule):
     rough = {**schedule.start, "unknowns": [round(x, 4) for x in schedule.start["unknowns"]]}
     found = verify(replace(schedule, start=rough))

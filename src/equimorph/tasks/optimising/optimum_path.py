@@ -49,8 +49,10 @@ class FollowedOptimum:
         Discontinuous moves of the optimum.
     schedule
         Parameters at every optimum, with margins and values of the objective and the constraints,
-        with straight lines in between; `verify` checks whether it can be executed. None if refused
-        or if the optimum jumps, which no schedule can follow.
+        with straight lines in between. Where the optima lie on a margin or a constraint, these
+        lines may fall short of it by the square of their length: `verify` says by how much, and
+        whether the schedule can be executed. None if refused or if the optimum jumps, which no
+        schedule can follow.
     """
 
     status: Literal["arrived", "refused"]

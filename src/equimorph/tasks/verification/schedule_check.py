@@ -24,7 +24,7 @@ from equimorph.structures import State, States, Structure, from_identity, join_s
 from equimorph.structures.metric import metric_length
 from equimorph.tasks.distances import path_lengths
 from equimorph.tasks.route import describe_obstacle, describe_place, schedule_of
-from equimorph.tasks.start import check_schedule, inadmissible
+from equimorph.tasks.start import check_schedule, critical, inadmissible
 from equimorph.tasks.straight_lines import (
     AT_GOAL,
     FINE,
@@ -244,6 +244,8 @@ def verify(
     done = follow_polyline(begin, rows, constraints, options or FINE)
     margins = done.states.margin
     why, last = _violation(done, margins, margin, len(rows))
+    if why and done.end.at == 0.0:
+        why = critical("start", begin) or why
     if why:
         kept = slice(0, last + 1)
         event = done.end if done.end.kind != "arrived" else None
