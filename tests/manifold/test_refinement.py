@@ -501,6 +501,7 @@ def test_a_change_of_topology_is_no_clean_refinement():
     assert fine.audit.changed == 1
     assert not fine.audit.clean
     assert ("changes of topology", "1") in fine.audit.rows()
+    assert refined(fine, 0.1).audit.changed == 1
 
 
 def test_vertices_that_are_added_twice_to_the_same_ones_do_not_meet(coarse):

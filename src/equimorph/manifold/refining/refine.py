@@ -256,7 +256,7 @@ def refine_cells(eset: EquilibriumSet, accuracy: float, progress: Progress) -> E
         unrefined=int((edges.error > SHARE[len(eset.names)] * accuracy).sum()),
         smallest_angle=smallest_angle(fabric),
         smallest_dihedral=smallest_dihedral(fabric),
-        changed=_topology_change(eset.audit, out.audit),
+        changed=eset.audit.changed + _topology_change(eset.audit, out.audit),
         smallest_free_angle=smallest_free_angle(fabric),
     )
     return with_audit(out, quality)
