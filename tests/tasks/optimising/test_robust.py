@@ -127,6 +127,29 @@ def test_worst_cases_at_folds_are_not_those_of_another_sheet():
     assert (worst.function(delta[:, None], p) == np.inf).all()
 
 
+@pytest.mark.parametrize("room", [1.2, 1.06, 1.01, 1.002])
+def test_an_optimum_beside_the_edge_is_not_taken_for_one_on_it(room):
+    """y = −b − 4 s wants both as large as possible; x stands on its fold at b − s = −2 / √27.
+
+    In the corner of the box, the box of imperfections has some room to the fold; where more room is
+    demanded first, s must give way, which costs more than going onto the edge.
+    """
+    energy = "x**4/4 - x**2/2 - (b - s)*x + (y + b + 4*s)**2/2"
+    unknowns = [em.Unknown("x", 1.0, guesses=(-2, 2)), em.Unknown("y", 0.0, guesses=(-2, 2))]
+    parameters = [
+        em.Parameter("b", "1", 1.0, "load", 0.0),
+        em.Parameter("s", "1", 1.0, "actuator", 0.0),
+    ]
+    owner = em.EnergyStructure(energy, unknowns, parameters)
+    offset = 0.03
+    most = 0.3 + 2.0 / np.sqrt(27.0) - room * offset
+    eset = em.equilibrium_set(owner, em.Box(b=(0.0, 0.3), s=(0.0, most)), intervals=(6, 6))
+    y, right = owner.descriptor("y"), owner.descriptor("x") >= 0.0
+    found = em.robust_optimum(eset, y, {"b": offset}, within=[right])
+    assert found.state["b"] == pytest.approx(0.3, abs=1e-9)
+    assert found.guaranteed == pytest.approx(-0.3 + offset - 4.0 * most, abs=1e-9)
+
+
 def test_what_cannot_be_kept_stable_is_refused(spring_at_load):
     """With F off by 0.5 no δ > 0.1 stays stable."""
     found = ask(spring_at_load, spring_at_load.structure.angle, {"F": 0.5})

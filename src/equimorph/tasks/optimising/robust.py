@@ -23,7 +23,7 @@ from equimorph.tolerances import FEASIBLE
 
 Branches = Float[np.ndarray, "lanes m"]
 
-ROOMS = (1.1, 1.02, 1.005)
+ROOMS = (1.1, 1.02, 1.005, 1.001)
 """Shares of the box around which it is stable in the first searches; values at the very edge have
 no slopes."""
 EXCHANGES = 7
@@ -306,7 +306,7 @@ def _judge(question: _Question, best: "_End") -> _Judged:
 
 @dataclass(frozen=True)
 class _End:
-    """A candidate; `bound`: whether the required room binds, and not the edge.
+    """A candidate; `bound`: whether the required room binds, or it would be better off the edge.
 
     ray: number of the way at whose point on the side it is about to lose its stability.
     """
@@ -384,7 +384,11 @@ def _at_edge(question: _Question, number: int) -> Descriptor:
 def _edge(programme: Programme, ray: Ray, number: int, end: CriticalPoint) -> _End:
     state = State(programme.setting.structure, end.point.z[0], end.point.p[0])
     found = certificate(programme, end)
-    return _End(state, float(end.expansion.f.max()), ray.offsets, found, False, number)
+    outward, inward = (
+        found.active.get(str(rule), 0.0) for rule in (ray.room >= 1.0, ray.room <= 1.0)
+    )
+    held = outward > inward + BEYOND * max(found.active.values(), default=0.0)
+    return _End(state, float(end.expansion.f.max()), ray.offsets, found, not held, number)
 
 
 def _negative(descriptor: Descriptor) -> Descriptor:
