@@ -27,7 +27,7 @@ from equimorph.equilibria.critical_tests import (
     quadratic,
 )
 from equimorph.equilibria.first_stable import BOUND, OFF, STABLE, FirstStable
-from equimorph.equilibria.natural_sheet import NaturalSheet, natural_sheet
+from equimorph.equilibria.natural_sheet import NaturalSheet, natural_sheet, stable_natural
 from equimorph.equilibria.trace import Traces, trace
 from equimorph.equilibria.trace_options import EventCode
 from equimorph.errors import InputError
@@ -119,7 +119,7 @@ class Unloaded:
     def natural(self, p: Parameters) -> tuple[Lanes, Flags]:
         """Natural states below points, and where there are any."""
         if self.sheet is None:
-            z, good = self.structure.natural(self.parameters(p))
+            z, good = stable_natural(self.structure, self.parameters(p))
             return z, good & self.structure.may_be_natural(p)
         return self.sheet.states(p[:, self.sheet.places])
 

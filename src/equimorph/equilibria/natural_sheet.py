@@ -58,7 +58,7 @@ class NaturalSheet:
         z[here], found[here] = _step(self.structure, self.z[vertex[here]], before, p[here])
         rest = np.flatnonzero(~found & self.found[vertex])
         if len(rest):
-            z[rest], found[rest] = self.structure.natural(p[rest])
+            z[rest], found[rest] = stable_natural(self.structure, p[rest])
         return z, found & self.structure.may_be_natural(p)
 
 
@@ -83,10 +83,18 @@ def natural_sheet(
     asked[~defined] = 1
     while (seeds := _seeds((found | ~defined).reshape(shape), asked)).size:
         asked[seeds] = 1
-        z[seeds], found[seeds] = structure.natural(p[seeds])
+        z[seeds], found[seeds] = stable_natural(structure, p[seeds])
         _flood(structure, p, z, found, shape, seeds[found[seeds]])
     found &= defined
     return NaturalSheet(structure, base, (axes[0], axes[1]), places, z, found)
+
+
+def stable_natural(structure: Structure, p: Parameters) -> tuple[Lanes, Flags]:
+    """Natural states that the structure computes; a structure rests in none that is unstable."""
+    z, found = structure.natural(p)
+    stable = found.copy()
+    stable[found] = structure.index(z[found], p[found]) == 0
+    return z, stable
 
 
 def _parameters(

@@ -6,7 +6,7 @@ from scipy import optimize
 
 import equimorph as em
 from equimorph.errors import InputError
-from equimorph.tasks.maps.limit_load import LimitLoadMap
+from equimorph.tasks.maps.limit_load import LimitLoadMap, RayStatus
 
 
 def curves(lmap, kind):
@@ -225,3 +225,20 @@ def test_settings_outside_the_grid_are_refused(uniform):
         uniform.at(Theta=2.0, Delta=0.0)
     with pytest.raises(InputError, match="`setting` must give Theta and Delta; got Theta"):
         uniform.at(Theta=1.0)
+
+
+def test_unstable_natural_states_bear_no_load():
+    """E = k x²/2 − x⁴/4 − F x with k = a + b rests at x = 0 where k > 0: F ≤ 2 (k/3)^(3/2)."""
+    parameters = [
+        em.Parameter("a", "1", 1.0, "actuator", 0.5),
+        em.Parameter("b", "1", 1.0, "actuator", 0.5),
+        em.Parameter("F", "1", 1.0, "load", 0.0),
+    ]
+    unknowns = [em.Unknown("x", 0.0, guesses=(-2, 2))]
+    owner = em.EnergyStructure("(a + b)*x**2/2 - x**4/4 - F*x", unknowns, parameters)
+    lmap = em.limit_load_map(owner, em.Grid(a=(-1.0, 1.0, 8), b=(-0.9, 1.0, 8)), "F")
+    stiffness = np.add.outer(*lmap.grid.axes())
+    known = np.where(stiffness > 0.0, 2.0 * (np.maximum(stiffness, 0.0) / 3.0) ** 1.5, np.nan)
+    np.testing.assert_allclose(lmap.value, known, atol=1e-9)
+    assert np.all(lmap.status[stiffness <= 0.0] == RayStatus.NO_NATURAL_STATE)
+    assert em.strongest(lmap).best.value == pytest.approx(2.0 * (2.0 / 3.0) ** 1.5)

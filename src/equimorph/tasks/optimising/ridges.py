@@ -156,7 +156,8 @@ def _top_of(values: Float[np.ndarray, " stencil"]) -> tuple[float, float]:
     roots = polynomial.deriv().roots()
     real = roots.real[np.abs(roots.imag) < 1e-9]
     tried = np.concatenate([STENCIL[[0, -1]], real[np.abs(real) < STENCIL[-1]]])
-    return float(tried[polynomial(tried).argmax()]), float(abs(powers[-1] / powers[2]))
+    share = abs(powers[-1]) / max(abs(powers[2]), 1e-300)
+    return float(tried[polynomial(tried).argmax()]), float(share)
 
 
 def _cliff_at(lmap: LimitLoadMap, locus: Locus, spot: Spots, side: float) -> Ridge | None:
