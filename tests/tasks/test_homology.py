@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from equimorph.tasks.planning.route_classes import cocycles, signature
+from equimorph.tasks.planning.homology import cocycles, signature
 
 # in any order: signs depend on which end of an edge has the lower number
 NUMBERS = np.random.default_rng(3).permutation(36)

@@ -34,8 +34,9 @@ def plain_search(links, start, goal, count, visits_at_most, turns):
 
 @pytest.mark.parametrize("seed", range(8))
 @pytest.mark.parametrize("holes", [0, 1, 3])
-def test_the_compiled_search_finds_the_paths_of_the_plain_one(seed: int, holes: int):
-    """Equal costs, of which there are many, are resolved alike."""
+@pytest.mark.parametrize("wanted", [0, 2])
+def test_the_compiled_search_finds_the_paths_of_the_plain_one(seed: int, holes: int, wanted: int):
+    """Equal costs, of which there are many, are resolved alike; long paths are left out."""
     rng, nodes = np.random.default_rng(seed), 60
     pairs = rng.integers(0, nodes, (240, 2))
     pairs = np.concatenate([pairs[pairs[:, 0] != pairs[:, 1]], [[0, 1], [0, nodes - 1]]])
@@ -54,9 +55,13 @@ def test_the_compiled_search_finds_the_paths_of_the_plain_one(seed: int, holes: 
         steps,
         changes,
         np.array([0, nodes - 1]),
-        np.array([5, 40, 2]),
+        np.array([5, 40, 2, wanted]),
+        1.5,
     )
     expected = plain_search(links, 0, nodes - 1, 5, 40, 2)
+    if 0 < wanted <= len(expected):
+        longest = 1.5 * expected[wanted - 1][1]
+        expected = [each for each in expected if each[1] <= longest]
     assert len(found) == len(expected)
     for label, (own, _, way) in zip(found.tolist(), expected, strict=True):
         assert tuple(classes[labels[label, 1]].tolist()) == own

@@ -7,8 +7,9 @@ import pytest
 
 import equimorph as em
 from equimorph.errors import InputError
+from equimorph.tasks.planning.homology import cocycles, signature
 from equimorph.tasks.planning.planner import plan
-from equimorph.tasks.planning.route_classes import alternatives, cocycles, signature
+from equimorph.tasks.planning.route_classes import alternatives
 from equimorph.tasks.planning.smoothing import smoothed
 from equimorph.tasks.verification.schedule_check import verify
 from typecheck import unchecked

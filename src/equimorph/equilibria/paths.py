@@ -24,7 +24,7 @@ from equimorph.equilibria.trace import Traces, trace
 from equimorph.equilibria.trace_options import EventCode, EventKind, TraceOptions
 from equimorph.errors import InputError
 from equimorph.model import Constraint, Descriptor, Progress
-from equimorph.structures import State, States
+from equimorph.structures import State, States, join_states
 from equimorph.structures.metric import metric_length
 from equimorph.tables import Table, Tabular
 from equimorph.tolerances import FEASIBLE
@@ -150,25 +150,40 @@ def _trace_one(
         options = options.finer()
 
 
-def lift_legs(states: States, within: tuple[Constraint, ...], options: TraceOptions) -> Path | None:
-    """Path through states that are known, its straight legs followed side by side.
+def lift_legs(
+    chains: Sequence[States], within: tuple[Constraint, ...], options: TraceOptions
+) -> list[Path | None]:
+    """Paths through states that are known, their straight legs followed side by side.
 
-    As from the first of them in turn, in the time of the longest leg. None unless every leg leads
-    from one state to the next and passes nothing on its way.
+    As from the first state of each in turn, in the time of the longest leg. None unless every leg
+    leads from one state to the next and passes nothing on its way.
     """
-    structure, begin, end = states.structure, states[:-1], states[1:]
+    structure = chains[0].structure
     options = replace(options, record=True, look_inside=False)
+    begin, end = (
+        join_states(structure, [each[part] for each in chains])
+        for part in (slice(None, -1), slice(1, None))
+    )
+    owner = np.repeat(np.arange(len(chains)), [len(each) - 1 for each in chains])
     curve = ParameterLine(structure, begin.p.copy(), end.p - begin.p)
-    if not (curve.weight > 0.0).all():
-        return None
+    still = np.isin(owner, owner[~(curve.weight > 0.0)])
+    moving = np.flatnonzero(~still)
+    if len(moving) == 0:
+        return [None] * len(chains)
+    owner, curve, begin, end = owner[moving], curve.take(moving), begin[moving], end[moving]
     outcome = trace(curve, begin.z.copy(), within, options)
     outcome = with_hidden_events(curve, begin.z, outcome, options)
     outcome = with_multiple_points(curve, begin.z, outcome)
     joined = metric_length(structure, outcome.z - end.z) < JOINED
-    arrived = (outcome.code == EventCode.ARRIVED) & joined
-    if len(outcome.passed.lanes) or not arrived.all():
-        return None
-    return _chain(states[0], curve, outcome, within)
+    good = (outcome.code == EventCode.ARRIVED) & joined
+    good[outcome.passed.lanes] = False
+    paths = list[Path | None]()
+    for number, chain in enumerate(chains):
+        legs = np.flatnonzero(owner == number)
+        whole = len(legs) > 0 and bool(good[legs].all())
+        own = _lanes(outcome, legs) if whole else None
+        paths.append(_chain(chain[0], curve.take(legs), own, within) if own else None)
+    return paths
 
 
 def _chain(start: State, curve: Curve, outcome: Traces, within: tuple[Constraint, ...]) -> Path:
@@ -184,7 +199,7 @@ def _chain(start: State, curve: Curve, outcome: Traces, within: tuple[Constraint
     index = np.concatenate([points.index, outcome.index])[order]
     length += np.concatenate([[0.0], np.cumsum(travelled)])[lane]
     last = np.array([count - 1])
-    end = _end(curve.take(last), _lane(outcome, count - 1), count - 1, within)
+    end = _end(curve.take(last), _lanes(outcome, last), count - 1, within)
     return _join(start, [_Segment(z, p, lane + t, length, index, (end,))])
 
 
@@ -232,18 +247,20 @@ def _segment(
     return _Segment(z, p, number + t, length, index, events)
 
 
-def _lane(outcome: Traces, lane: int) -> Traces:
-    """Traces of one lane alone."""
-    one = slice(lane, lane + 1)
+def _lanes(outcome: Traces, lanes: Some) -> Traces:
+    """Traces of some lanes in growing order, numbered anew."""
+    passed = outcome.passed.take(np.isin(outcome.passed.lanes, lanes))
+    points = outcome.points.take(np.isin(outcome.points.lanes, lanes))
+    number = {lane: k for k, lane in enumerate(lanes.tolist())}
     return Traces(
-        outcome.code[one],
-        outcome.z[one],
-        outcome.t[one],
-        outcome.index[one],
-        outcome.travelled[one],
-        {0: outcome.why[lane]} if lane in outcome.why else {},
-        outcome.passed.take(outcome.passed.lanes == lane),
-        outcome.points.take(outcome.points.lanes == lane),
+        outcome.code[lanes],
+        outcome.z[lanes],
+        outcome.t[lanes],
+        outcome.index[lanes],
+        outcome.travelled[lanes],
+        {number[lane]: why for lane, why in outcome.why.items() if lane in number},
+        replace(passed, lanes=np.searchsorted(lanes, passed.lanes)),
+        replace(points, lanes=np.searchsorted(lanes, points.lanes)),
     )
 
 

@@ -34,3 +34,18 @@ def join_nodes(count, pairs):
         else:
             numbers[node] = numbers[first]
     return numbers
+
+
+@njit(**FLAGS)
+def before_in_chain(count, first, second, costs):
+    """Node before each on the cheapest chain from the first node, or −1 where none leads there.
+
+    Links lead from lower to higher numbers, in the order of their first ends.
+    """
+    before, least = np.full(count, -1), np.full(count, np.inf)
+    least[0] = 0.0
+    for link in range(first.shape[0]):
+        total = least[first[link]] + costs[link]
+        if total < least[second[link]]:
+            least[second[link]], before[second[link]] = total, first[link]
+    return before

@@ -10,11 +10,11 @@ from equimorph.arrays import Float
 from equimorph.equilibria import Event, Landing, Path, lift, lift_legs
 from equimorph.errors import InputError
 from equimorph.model import Constraint, Descriptor, Schedule, names_of
-from equimorph.structures import State, States, Structure
+from equimorph.structures import State, States, Structure, join_states
 from equimorph.tables import html_table, units_of
 from equimorph.tasks.distances import distance
 from equimorph.tasks.robustness.evidence import Survival
-from equimorph.tasks.straight_lines import FINE, least_margin
+from equimorph.tasks.straight_lines import FINE, least_margins
 from equimorph.tolerances import SAME_STATE
 
 Corners = list[dict[str, float]]
@@ -183,34 +183,80 @@ def verify_route(
     way_points: Corners,
     within: tuple[Constraint, ...],
     monitor: Sequence[Descriptor] = (),
-    corners: States | None = None,
 ) -> Route:
-    """Lift the way-points once more, finely; the route if it ends in the goal, else the reason.
+    """Lift the way-points once more, finely; the route if it ends in the goal, else the reason."""
+    path = lift(start, way_points, within=within, options=FINE)
+    return _judged([path], [goal], [way_points], within, monitor)[0]
 
-    If the states at all `corners` are known, those of start and goal among them, legs are lifted
-    side by side; one after the other if that does not lead to the goal.
+
+def verify_corners(
+    chains: Sequence[States],
+    way_points: Sequence[Corners],
+    within: tuple[Constraint, ...],
+    monitor: Sequence[Descriptor] = (),
+) -> list[Route]:
+    """Routes over known corners, start and goal among them; see `verify_route`.
+
+    All legs are lifted side by side; those of a route one after the other if that does not lead to
+    its goal.
     """
-    path = None if corners is None else lift_legs(corners, within, FINE)
-    if path is None:
-        path = lift(start, way_points, within=within, options=FINE)
-    names = list(dict.fromkeys(name for corner in way_points for name in corner))
+    if not chains:
+        return []
+    paths = [
+        path or lift(chain[0], steps, within=within, options=FINE)
+        for path, chain, steps in zip(
+            lift_legs(chains, within, FINE), chains, way_points, strict=True
+        )
+    ]
+    goals = [chain[len(chain) - 1] for chain in chains]
+    return _judged(paths, goals, way_points, within, monitor)
+
+
+def _judged(
+    paths: Sequence[Path],
+    goals: Sequence[State],
+    way_points: Sequence[Corners],
+    within: tuple[Constraint, ...],
+    monitor: Sequence[Descriptor],
+) -> list[Route]:
+    """Routes along paths that end in their goals and are stable, or why they do not."""
+    structure, routes, led = paths[0].states.structure, list[Route](), list[int]()
+    for number, (path, goal, steps) in enumerate(zip(paths, goals, way_points, strict=True)):
+        why = _missed(path, goal, steps)
+        routes.append(refusal(why, steps, path))
+        led += [] if why else [number]
+    every = join_states(structure, [paths[k].states for k in led]).margin
+    cuts = np.cumsum([len(paths[k].states) for k in led])[:-1]
+    margins = dict(zip(led, np.split(every, cuts), strict=True)) if led else {}
+    for k in led:
+        if not (margins[k] > 0.0).all():
+            place = paths[k].states[int(np.argmin(margins[k]))]
+            why = f"unstable at {describe_place(place, _names(way_points[k]))}"
+            routes[k] = refusal(why, way_points[k], paths[k])
+            del margins[k]
+    least = least_margins([paths[k].states for k in margins], list(margins.values()))
+    watched = (*(c.descriptor for c in within), *monitor)
+    for (k, own), lowest in zip(margins.items(), least, strict=True):
+        schedule, length = schedule_of(paths[k], own, watched), float(paths[k].length[-1])
+        routes[k] = Route("arrived", "", way_points[k], paths[k], lowest.margin, length, schedule)
+    return routes
+
+
+def _names(way_points: Corners) -> list[str]:
+    return list(dict.fromkeys(name for corner in way_points for name in corner))
+
+
+def _missed(path: Path, goal: State, way_points: Corners) -> str:
+    """Why a path does not lead to a goal; empty if it does."""
     end = path.end
     if end.kind != "arrived":
-        return refusal(_reason(path, names, len(way_points)), way_points, path)
+        return _reason(path, _names(way_points), len(way_points))
     if distance(end.state, goal) > SAME_STATE:
-        return refusal(
+        return (
             f"the way-points lead to another equilibrium over the goal's parameters, "
-            f"{distance(end.state, goal):.3g} away in the metric",
-            way_points,
-            path,
+            f"{distance(end.state, goal):.3g} away in the metric"
         )
-    margins = path.states.margin
-    if not (margins > 0.0).all():
-        k = int(np.argmin(margins))
-        return refusal(f"unstable at {describe_place(path.states[k], names)}", way_points, path)
-    schedule = schedule_of(path, margins, (*(c.descriptor for c in within), *monitor))
-    least, length = least_margin(path.states, margins).margin, float(path.length[-1])
-    return Route("arrived", "", way_points, path, least, length, schedule)
+    return ""
 
 
 def _reason(path: Path, names: Sequence[str], segments: int) -> str:

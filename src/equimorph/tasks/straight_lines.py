@@ -1,5 +1,6 @@
 """What lies between states where parameters move straight from each to the next."""
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -8,7 +9,7 @@ from equimorph.arrays import Flags, Float, Int, Parameters
 from equimorph.equilibria import Lifts, TraceOptions, lift
 from equimorph.manifold.lookup.exact_states import exact_states
 from equimorph.model import Constraint, names_of
-from equimorph.structures import State, States
+from equimorph.structures import State, States, join_states
 from equimorph.structures.metric import metric_length
 from equimorph.tolerances import SAME_STATE
 
@@ -82,17 +83,30 @@ class Least(NamedTuple):
 
 
 def least_margin(states: States, margins: Float[np.ndarray, " states"]) -> Least:
-    """Least margin where parameters move straight from state to state.
+    """Least margin where parameters move straight from state to state; see `least_margins`."""
+    return least_margins([states], [margins])[0]
+
+
+def least_margins(
+    chains: Sequence[States], margins: Sequence[Float[np.ndarray, " states"]]
+) -> list[Least]:
+    """Least margin of each of some chains, where parameters move straight from state to state.
 
     Every line may be a chord that dips towards a fold. Where its middle leaves a doubt, the least
     is searched by golden section of exact states.
     """
-    lowest = int(np.argmin(margins))
-    known = Least(float(margins[lowest]), states[lowest], lowest)
-    low = _doubtful(states, margins)
+    if not chains:
+        return []
+    states, every = join_states(chains[0].structure, chains), np.concatenate(margins)
+    chain = np.repeat(np.arange(len(chains)), [len(each) for each in chains])
+    out = list[Least]()
+    for each, known in zip(chains, margins, strict=True):
+        lowest = int(np.argmin(known))
+        out.append(Least(float(known[lowest]), each[lowest], lowest))
+    low = _doubtful(states, every, chain, np.array([least.margin for least in out]))
     if not len(low):
-        return known
-    high = low + 1.0
+        return out
+    owner, high = chain[low.astype(int)], low + 1.0
     inner = [high - GOLDEN * (high - low), low + GOLDEN * (high - low)]
     values = [_margins(states, each)[0] for each in inner]
     for _ in range(ROUNDS):
@@ -102,19 +116,29 @@ def least_margin(states: States, margins: Float[np.ndarray, " states"]) -> Least
         found = _margins(states, new)[0]
         inner = [np.where(left, new, inner[1]), np.where(left, inner[0], new)]
         values = [np.where(left, found, values[1]), np.where(left, values[0], found)]
-    places = np.concatenate(inner)
-    every, between = _margins(states, places)
-    best = int(np.argmin(every))
-    if every[best] >= known.margin:
-        return known
-    return Least(float(every[best]), between[best], int(places[best]))
+    places, owner = np.concatenate(inner), np.tile(owner, 2)
+    found, between = _margins(states, places)
+    for number in np.unique(owner).tolist():
+        own = np.flatnonzero(owner == number)
+        best = own[np.argmin(found[own])]
+        if found[best] < out[number].margin:
+            line = int(places[best]) - int(np.searchsorted(chain, number))
+            out[number] = Least(float(found[best]), between[best], line)
+    return out
 
 
-def _doubtful(states: States, margins: Float[np.ndarray, " states"]) -> Places:
-    """Numbers of the lines along which the margin may fall below all values."""
-    least = margins.min()
-    low = np.minimum(margins[:-1], margins[1:]) <= least + (HIGHER - 1) * abs(least)
-    lines = np.flatnonzero(low & (states.p[1:] != states.p[:-1]).any(axis=1))
+def _doubtful(
+    states: States,
+    margins: Float[np.ndarray, " states"],
+    chain: Int[np.ndarray, " states"],
+    least: Float[np.ndarray, " chains"],
+) -> Places:
+    """Numbers of the lines along which the margin may fall below all values of their chains."""
+    known = least[chain[:-1]]
+    lower = np.minimum(margins[:-1], margins[1:])
+    near = lower <= known + (HIGHER - 1) * np.abs(known)
+    moved = (states.p[1:] != states.p[:-1]).any(axis=1)
+    lines = np.flatnonzero(near & moved & (chain[1:] == chain[:-1]))
     first, last = margins[lines], margins[lines + 1]
     middle = _margins(states, lines + 0.5)[0]
     # the parabola a + slope s + bend s² over −½ ≤ s ≤ ½ around the middle
@@ -122,7 +146,7 @@ def _doubtful(states: States, margins: Float[np.ndarray, " states"]) -> Places:
     inside = np.abs(slope) < DEEPER * np.abs(bend)
     lowest = middle - DEEPER * slope**2 / (4.0 * np.maximum(bend, 1e-300))
     low = np.where(inside & (bend > 0.0), np.minimum(lowest, middle), np.inf)
-    return np.asarray(lines[(low < least) | ~np.isfinite(middle)], float)
+    return np.asarray(lines[(low < known[lines]) | ~np.isfinite(middle)], float)
 
 
 def _margins(states: States, places: Places) -> tuple[Places, States]:

@@ -26,7 +26,7 @@ from equimorph.tasks.planning.straightening import (
     best_corners,
     follow_direction,
     order_ends,
-    route_over_corners,
+    routes_over_corners,
 )
 from equimorph.tasks.route import Route, describe_place, refusal
 from equimorph.tasks.stable_part import cell_near
@@ -89,7 +89,7 @@ def route_with_reserve(
     if not paths:
         return None
     corners = best_corners(eset, paths, tightened)
-    return route_over_corners(eset, follow_direction(corners, ends), demands, monitor)
+    return routes_over_corners(eset, [follow_direction(corners, ends)], demands, monitor)[0]
 
 
 def _least_margin(ends: Ends, passing: Passing | None) -> float:

@@ -7,39 +7,45 @@ from equimorph.linalg.row_kernels import copy_row, rows_with_room, with_room
 
 
 @njit(nogil=True)
-def search_classes(starts, others, costs, changes, ends, limits):
+def search_classes(starts, others, costs, changes, ends, limits, ratio):
     """Dijkstra's algorithm on pairs of a node and a class, until enough classes reach the goal.
 
     starts, others, costs, changes: links from each node on, with what they add to a class; ends:
-    start and goal; limits: paths, visits of a node, and turns in a class at most. Return the labels
-    of the goal, and node, class and parent of each label, and the classes.
+    start and goal; limits: paths, visits of a node, and turns in a class at most, and the number of
+    the path which others may not exceed by more than a ratio. Return the labels of the goal, and
+    node, class and parent of each label, and the classes.
     """
     holes, links = changes.shape[1], others.shape[0]
-    room = 4 * (links + 16)
+    room = links + 16
     key, what = np.empty(room), np.empty((room, 3), np.int64)
     classes, known = np.zeros((64, holes), np.int64), 1
     labels, made = np.empty((1024, 3), np.int64), 0
+    # nodes and classes that were met: the least cost so far, or −1 where the label is final
     head, following = np.full(starts.shape[0] - 1, -1), np.empty(1024, np.int64)
+    of_class, least, met = np.empty(1024, np.int64), np.empty(1024), 1
+    head[ends[0]], following[0], of_class[0], least[0] = 0, -1, 0, 0.0
     visits = np.zeros(starts.shape[0] - 1, np.int64)
-    found, count = np.empty(limits[0], np.int64), 0
+    found, count, most = np.empty(limits[0], np.int64), 0, np.inf
     key[0], what[0, 0], what[0, 1], what[0, 2], size = 0.0, ends[0], 0, -1, 1
-    while size > 0 and count < limits[0]:
+    while size > 0 and count < limits[0] and key[0] <= most:
         cost, node, own, parent = key[0], what[0, 0], what[0, 1], what[0, 2]
         size -= 1
         key[0] = key[size]
         copy_row(what, size, what, 0)
         _sift_down(key, what, classes, size)
-        if visits[node] >= limits[1] or _is_done(head, following, labels, node, own):
+        place = _place_of(head, following, of_class, node, own)
+        if visits[node] >= limits[1] or cost != least[place]:
             continue
         visits[node] += 1
         if made == labels.shape[0]:
-            labels, following = rows_with_room(labels, made + 1), with_room(following, made + 1)
+            labels = rows_with_room(labels, made + 1)
         labels[made, 0], labels[made, 1], labels[made, 2] = node, own, parent
-        following[made], head[node] = head[node], made
-        made += 1
+        least[place], made = -1.0, made + 1
         if node == ends[1]:
             found[count] = made - 1
             count += 1
+            if count == limits[3]:
+                most = ratio * cost
             continue
         for link in range(starts[node], starts[node + 1]):
             if known == classes.shape[0]:
@@ -48,12 +54,21 @@ def search_classes(starts, others, costs, changes, ends, limits):
             if there < 0:
                 continue
             known = max(known, there + 1)
-            if _is_done(head, following, labels, others[link], there):
+            other, total = others[link], cost + costs[link]
+            place = _place_of(head, following, of_class, other, there)
+            if place >= 0 and total >= least[place]:
                 continue
+            if place < 0:
+                if met == least.shape[0]:
+                    of_class, least = with_room(of_class, met + 1), with_room(least, met + 1)
+                    following = with_room(following, met + 1)
+                place, met = met, met + 1
+                following[place], head[other], of_class[place] = head[other], place, there
+            least[place] = total
             if size == key.shape[0]:
                 key, what = with_room(key, size + 1), rows_with_room(what, size + 1)
-            key[size] = cost + costs[link]
-            what[size, 0], what[size, 1], what[size, 2] = others[link], there, made - 1
+            key[size] = total
+            what[size, 0], what[size, 1], what[size, 2] = other, there, made - 1
             size += 1
             _sift_up(key, what, classes, size - 1)
     return found[:count], labels[:made], classes[:known]
@@ -81,14 +96,12 @@ def _class_after(classes, known, own, change, most):
 
 
 @njit(nogil=True)
-def _is_done(head, following, labels, node, own):
-    """Whether a node has a label of a class."""
-    label = head[node]
-    while label >= 0:
-        if labels[label, 1] == own:
-            return True
-        label = following[label]
-    return False
+def _place_of(head, following, of_class, node, own):
+    """Place of a node in a class among those that were met, or −1."""
+    place = head[node]
+    while place >= 0 and of_class[place] != own:
+        place = following[place]
+    return place
 
 
 @njit(nogil=True)

@@ -9,8 +9,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import breadth_first_order, minimum_spanning_tree
 
 from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Bool, Edges, Float, Int
@@ -19,6 +17,7 @@ from equimorph.manifold.complex.kept_tables import from_cache
 from equimorph.manifold.geometry.topology import places_among
 from equimorph.model import Constraint, Descriptor
 from equimorph.structures import State, States, join_states
+from equimorph.tasks.planning.homology import Triangles, Values, cocycles, sides_of
 from equimorph.tasks.planning.kernels import search_classes
 from equimorph.tasks.planning.network import (
     Demands,
@@ -34,7 +33,7 @@ from equimorph.tasks.planning.straightening import (
     check_ends,
     follow_direction,
     order_ends,
-    route_over_corners,
+    routes_over_corners,
     straight_corners,
     violation,
 )
@@ -47,6 +46,8 @@ SPARE, UNSURE = 6, 1.15
 """Further classes whose best paths over the mesh are straightened, too, and up to which ratio of
 costs: ways over edges and diagonals of a grid of squares are too long by up to 8 %, and may come in
 another order."""
+SLACK = 1.08
+"""The same ratio of costs along chords in the search, and along chains with states between."""
 LABELS = 8
 """Classes that are kept at a vertex, for each requested route."""
 
@@ -110,19 +111,17 @@ def alternatives(
     best, failed = list[Route](), list[Route]()
     for tightened in demands.with_reserves(min(end.margin for end in ends)):
         classes = _Classes(eset, order_ends(ends), tightened)
-        paths, rough = classes.paths(count + SPARE)
+        paths, rough = classes.paths(count)
         most = np.sort(rough)[:count].max(initial=0.0)
         paths = [each for each, cost in zip(paths, rough, strict=True) if cost <= UNSURE * most]
         corners = straight_corners(eset, paths, tightened, same_class=True)
         corners = sorted(corners, key=lambda each: chain_cost(each, tightened))[:count]
-        routes = [
-            route_over_corners(eset, follow_direction(each, ends), demands, monitor)
-            for each in corners
-        ]
+        chains = [follow_direction(each, ends) for each in corners]
+        routes = routes_over_corners(eset, chains, demands, monitor)
         least = min((route.cost for route in routes if route.arrived), default=np.inf)
         if classes.direct < (1.0 - SHORTER) * least:
             chord = join_states(eset.structure, ends)
-            routes.append(route_over_corners(eset, chord, demands, monitor))
+            routes += routes_over_corners(eset, [chord], demands, monitor)
         best = max(best, [route for route in routes if route.arrived], key=len)
         failed += routes
         if routes and len(best) == len(routes):
@@ -130,10 +129,6 @@ def alternatives(
     if not failed:
         return (refusal(explain_no_route(eset, ends, demands)),)
     return tuple(sorted(best, key=lambda route: route.cost)[:count]) or (failed[0],)
-
-
-Triangles = Int[np.ndarray, "triangles 3"]
-Values = Int[np.ndarray, "edges holes"]
 
 
 @dataclass(frozen=True)
@@ -161,7 +156,7 @@ class _Diagonals:
     def of(cls, count: int, edges: Edges, triangles: Triangles, values: Values) -> "_Diagonals":
         """Those of a surface; vertices of edges and triangles are in growing order."""
         a, b, c = triangles.T
-        first, second, third = _sides(count, edges, triangles).T
+        first, second, third = sides_of(count, edges, triangles).T
         # from the lower end of each side to the vertex opposite: over which side, and its sign
         side, over = np.concatenate([first, second, third]), np.concatenate([third, first, first])
         low, far = np.concatenate([a, b, a]), np.concatenate([c, a, b])
@@ -194,36 +189,32 @@ class _Classes:
         self.eset, self.ends, self.demands = eset, ends, demands
         self.states = nodes_with_ends(eset, ends)
         network = network_of(eset)
-        allowed = network.admissible(eset, demands)
         self.network, (self.broken, _) = network, network.verdicts(demands)
-        self.inner = np.flatnonzero(allowed[network.pairs].all(axis=1))
-        pairs = np.sort(network.pairs[self.inner], axis=1)
+        key = demands.constraints, demands.margin
+        self.inner, pairs, values, self.across = from_cache(
+            eset, ("cocycles", *key), lambda: _surface_of(eset, demands)
+        )
 
-        triangles = np.sort(network.cells[allowed[network.cells].all(axis=1)], axis=1)
+        def costs_of() -> Float[np.ndarray, " links"]:
+            costs = network.costs(eset, demands.objective)[self.inner]
+            first, second = self.across.pairs.T
+            far = demands.objective.costs(eset.points, first, second, ROUGH)
+            return np.concatenate([costs, far])
 
-        def values_of() -> Values:
-            return cocycles(len(eset.points), pairs, triangles)
-
-        key = "cocycles", demands.constraints, demands.margin
-        values = from_cache(eset, key, values_of)
+        costs = from_cache(eset, ("costs over cells", *key, demands.objective.key), costs_of)
         own, own_costs = end_links(eset, ends, demands)
         own_values, known = _own_values(own, pairs, values, len(eset.points))
         self.direct = float(own_costs[~known].min(initial=np.inf))
-        own, own_costs, own_values = own[known], own_costs[known], own_values[known]
-        self.across = across = _Diagonals.of(len(eset.points), pairs, triangles, values)
-        costs = network.costs(eset, demands.objective)[self.inner]
-        first, second = across.pairs.T
-        far = demands.objective.costs(eset.points, first, second, ROUGH)
         self.graph = _Graph(
-            np.concatenate([pairs, across.pairs, own]),
-            np.concatenate([costs, far, own_costs]),
-            np.concatenate([values, across.values, own_values]),
+            np.concatenate([pairs, self.across.pairs, own[known]]),
+            np.concatenate([costs, own_costs[known]]),
+            np.concatenate([values, self.across.values, own_values[known]]),
         )
 
     def paths(self, count: int) -> tuple[list[States], Float[np.ndarray, " paths"]]:
-        """States along the best paths of up to `count` classes, and costs with cut corners.
+        """States along the best paths of `count` classes and a few more, if there are so many.
 
-        All links can be lifted; diagonals are left over two edges.
+        And costs with cut corners. All links can be lifted; diagonals are left over two edges.
         """
         while True:
             short = self._search(count)
@@ -235,7 +226,7 @@ class _Classes:
 
     def _search(self, count: int) -> list[Int[np.ndarray, " n"]]:
         """Paths of the best classes, by Dijkstra's algorithm on (vertex, class)."""
-        graph, nodes = self.graph, len(self.states)
+        graph, nodes, most = self.graph, len(self.states), count + SPARE
         good, broken = np.ones(len(graph.pairs), bool), self.broken[self.inner]
         good[: len(broken)] = ~broken
         good[len(broken) :][: len(self.across.via)] = ~broken[self.across.over].any(axis=1)
@@ -249,9 +240,23 @@ class _Classes:
             np.tile(costs, 2)[order],
             np.concatenate([values, -values])[order],
             np.array([nodes - 2, nodes - 1]),
-            np.array([count, LABELS * count, MOST_TURNS]),
+            np.array([most, LABELS * most, MOST_TURNS, count]),
+            SLACK * UNSURE,
         )
         return [_trace_back(labels, last) for last in found.tolist()]
+
+
+def _surface_of(
+    eset: EquilibriumSet, demands: Demands
+) -> tuple[Int[np.ndarray, " links"], Edges, Values, _Diagonals]:
+    """Links over admissible edges, their ends, cocycles along them, and links across edges."""
+    network, count = network_of(eset), len(eset.points)
+    allowed = network.admissible(eset, demands)
+    inner = np.flatnonzero(allowed[network.pairs].all(axis=1))
+    pairs = np.sort(network.pairs[inner], axis=1)
+    triangles = np.sort(network.cells[allowed[network.cells].all(axis=1)], axis=1)
+    values = cocycles(count, pairs, triangles)
+    return inner, pairs, values, _Diagonals.of(count, pairs, triangles, values)
 
 
 def _trace_back(labels: Int[np.ndarray, "labels 3"], last: int) -> Int[np.ndarray, " n"]:
@@ -299,100 +304,3 @@ def _own_values(
     elif out.shape[1]:
         fixed[direct] = False
     return out, fixed
-
-
-@dataclass(frozen=True)
-class _Surface:
-    """Sorted edges and triangles, and the edges of each triangle: ab, bc, ac of a < b < c."""
-
-    edges: Edges
-    triangles: Triangles
-    sides: Int[np.ndarray, "triangles 3"]
-
-
-def cocycles(count: int, edges: Edges, triangles: Triangles) -> Values:
-    """Integer cocycles that span the first cohomology of a surface; of edges from low to high.
-
-    Spanning trees of the vertices and of the triangles with the outside are set to zero and solved
-    for [EricksonWhittlesey2005]_; the edges in neither tree generate. Vertices of edges and
-    triangles are in growing order; at most two triangles are at an edge.
-    """
-    surface = _Surface(edges, triangles, _sides(count, edges, triangles))
-    tree = _spanning(count, edges)
-    parent, depth = _dual_tree(surface, tree)
-    determined = np.zeros(len(edges), bool)
-    determined[parent[parent >= 0]] = True
-    generators = np.flatnonzero(~tree & ~determined)
-    values = np.zeros((len(edges), len(generators)), dtype=int)
-    values[generators, np.arange(len(generators))] = 1
-    # the boundary of each triangle sums to zero, from the leaves of the tree to its roots
-    hung = np.flatnonzero(parent >= 0)
-    hung = hung[np.argsort(-depth[hung], kind="stable")]
-    signs = np.where(surface.sides == parent[:, None], 0, [1, 1, -1])
-    sense = np.array([1, 1, -1])[(signs == 0).argmax(axis=1)]
-    for level in np.split(hung, np.flatnonzero(np.diff(depth[hung])) + 1):
-        total = np.einsum("ts,tsh->th", signs[level], values[surface.sides[level]])
-        values[parent[level]] = -sense[level, None] * total
-    return values[:, np.abs(values).max(axis=0, initial=0) > 0]
-
-
-def _sides(count: int, edges: Edges, triangles: Triangles) -> Int[np.ndarray, "triangles 3"]:
-    """Edges ab, bc, ac of each triangle a < b < c."""
-    sides = np.stack([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [0, 2]]], axis=1)
-    return places_among(sides.reshape(-1, 2), edges, count).reshape(-1, 3)
-
-
-def _spanning(count: int, edges: Edges) -> Bool[np.ndarray, " edges"]:
-    """Edges of a spanning forest."""
-    weights = np.arange(1, len(edges) + 1, dtype=float)
-    graph = coo_array((weights, edges.T), shape=(count, count))
-    kept = minimum_spanning_tree(graph.tocsr()).data
-    tree = np.zeros(len(edges), bool)
-    tree[kept.astype(int) - 1] = True
-    return tree
-
-
-def _dual_tree(
-    surface: _Surface, tree: Bool[np.ndarray, " edges"]
-) -> tuple[Int[np.ndarray, " triangles"], Int[np.ndarray, " triangles"]]:
-    """Edge by which each triangle hangs on its parent, or −1; and how deep it hangs."""
-    outside = len(surface.triangles)
-    owner = np.repeat(np.arange(outside), 3)
-    side = surface.sides.ravel()
-    order = np.argsort(side, kind="stable")
-    side, owner = side[order], owner[order]
-    first = np.flatnonzero(np.concatenate([[True], side[1:] != side[:-1]]))
-    counts = np.diff(np.append(first, len(side)))
-    one = owner[first]
-    other = np.where(counts > 1, owner[np.minimum(first + 1, len(owner) - 1)], outside)
-    edge = side[first]
-    free = ~tree[edge]
-    one, other, edge = one[free], other[free], edge[free]
-    shape = (outside + 1, outside + 1)
-    graph = coo_array((np.ones(len(one)), (one, other)), shape=shape).tocsr()
-    keys = one * (outside + 1) + other
-    last = np.argsort(keys, kind="stable")
-    parent, depth = np.full(outside, -1), np.zeros(outside + 1, int)
-    seen = np.zeros(outside + 1, bool)
-    for root in (outside, *range(outside)):
-        if seen[root]:
-            continue
-        found, before = breadth_first_order(graph, root, directed=False)
-        seen[found] = True
-        below = found[1:]
-        for triangle, above in zip(below.tolist(), before[below].tolist(), strict=True):
-            depth[triangle] = depth[above] + 1
-        pair = np.sort(np.stack([below, before[below]]), axis=0)
-        at = np.searchsorted(keys[last], pair[0] * (outside + 1) + pair[1], side="right") - 1
-        parent[below] = edge[last[at]]
-    return parent, depth[:outside]
-
-
-def signature(
-    count: int, edges: Edges, values: Values, path: Int[np.ndarray, " n"]
-) -> tuple[int, ...]:
-    """Class of a path over edges."""
-    steps = np.stack([path[:-1], path[1:]], axis=1)
-    places = places_among(steps, edges, count)
-    signs: Float[np.ndarray, " n"] = np.where(steps[:, 0] < steps[:, 1], 1, -1)
-    return tuple((signs[:, None] * values[places]).sum(axis=0).astype(int).tolist())

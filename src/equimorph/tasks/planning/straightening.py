@@ -11,14 +11,15 @@ from equimorph.equilibria import Guards, ParameterLine, TraceOptions, settle
 from equimorph.equilibria.trace import trace
 from equimorph.equilibria.trace_options import EventCode
 from equimorph.errors import InputError
-from equimorph.linalg.graphs import shortest_path
+from equimorph.linalg.graph_kernels import before_in_chain
+from equimorph.linalg.graphs import shortest_path, walk_back
 from equimorph.manifold import EquilibriumSet
 from equimorph.model import Descriptor, position
 from equimorph.structures import States, join_states
 from equimorph.tasks.planning.corner_moves import ActuatorBox, chords, move_by_chords, move_by_lifts
 from equimorph.tasks.planning.network import Demands, Ends, connect
 from equimorph.tasks.planning.shortening import Shortener
-from equimorph.tasks.route import Corners, Route, refusal, verify_route
+from equimorph.tasks.route import Corners, Route, refusal, verify_corners, verify_route
 from equimorph.tasks.start import check_equilibrium, check_fixed_parameters, inadmissible
 
 MOST_SHORTCUTS = 8000
@@ -219,8 +220,8 @@ class _Legs:
 
     def cheapest(self, each: float, some: Flags) -> Some | None:
         """Corners of the cheapest chain of some legs, of which each costs more; None without."""
-        pairs, count = np.stack([self.first[some], self.second[some]], axis=1), len(self.number)
-        return shortest_path(count, pairs, self.cost[some] + each, (0, count - 1))
+        count, links = len(self.number), (self.first[some], self.second[some])
+        return walk_back(before_in_chain(count, *links, self.cost[some] + each), 0, count - 1)
 
     def along(self, path: Some, same_class: bool) -> Int[np.ndarray, " legs"]:
         """Legs of a chain; within a class all shorter ones from the same corners, too."""
@@ -281,18 +282,19 @@ def verify_way_points(
     return check_margin(verify_route(*ends, corners, demands.constraints, monitor), demands)
 
 
-def route_over_corners(
-    eset: EquilibriumSet, corners: States, demands: Demands, monitor: Sequence[Descriptor]
-) -> Route:
-    """Return the route over corners from start to goal, verified, with its cost."""
-    ends, steps = (corners[0], corners[len(corners) - 1]), way_points_of(eset, corners)
-    found = verify_route(*ends, steps, demands.constraints, monitor, corners)
-    return check_margin(found, demands)
+def routes_over_corners(
+    eset: EquilibriumSet, chains: Sequence[States], demands: Demands, monitor: Sequence[Descriptor]
+) -> list[Route]:
+    """Return the routes over corners from start to goal, verified, with their costs."""
+    steps = [way_points_of(eset, corners) for corners in chains]
+    found = verify_corners(chains, steps, demands.constraints, monitor)
+    return [check_margin(route, demands) for route in found]
 
 
 def way_points_of(eset: EquilibriumSet, corners: States) -> Corners:
     """Way-points of a polygon from its first corner."""
-    return [{name: corner[name] for name in eset.names} for corner in list(corners)[1:]]
+    columns = zip(*(corners[name][1:].tolist() for name in eset.names), strict=True)
+    return [dict(zip(eset.names, values, strict=True)) for values in columns]
 
 
 def straight_corners(
