@@ -6,11 +6,12 @@ import pytest
 import equimorph as em
 from equimorph.manifold.queries.nearest import SetPoints
 from equimorph.structures import State, States, stability_margin
-from equimorph.tasks.optimising.tangent_steps import step_along, tangents_at
+from equimorph.tasks.optimising.tangent_steps import step_along
 from equimorph.tasks.planning.curves import CurveSteps, solve_block_tridiagonal
 from equimorph.tasks.planning.mesh_paths import cheapest_path
 from equimorph.tasks.planning.network import Demands
 from equimorph.tasks.planning.objectives import length_through
+from equimorph.tasks.planning.shortening import Shortener
 from oracles.spring_geodesics import shortest_length
 from sets import arch_set, spring_set
 from typecheck import unchecked
@@ -117,11 +118,11 @@ def test_slopes_of_walls_are_those_of_their_distances():
     start, goal = (stable_near(eset, place) for place in ARCH[1])
     demands = Demands.of(eset.structure, "length", eset.constraints, 0.0)
     steps = CurveSteps(eset, demands)
-    curve = steps.curve(cheapest_path(eset, (start, goal), demands))
+    curve = steps.curves([cheapest_path(eset, (start, goal), demands)])[0]
     assert curve is not None
     inner = curve.take(curve.inner)
-    frames, at = tangents_at(steps.setting, SetPoints(inner.z, inner.p, inner.rows))
-    slopes = steps._slopes(inner, frames)
+    frames, at = inner.frames, SetPoints(inner.z, inner.p, inner.frames)
+    slopes = steps._slopes(inner)
     for k in range(2):
         along, sides = np.zeros((len(inner.z), 2)), []
         for along[:, k] in (1e-4, -1e-4):
@@ -175,3 +176,17 @@ def test_routes_over_snaps_are_the_same_in_the_mirror():
             routes = [em.plan(eset, *each, snap_price=1e-3) for each in (pair, image)]
         assert [len(route.snaps) for route in routes] == [1, 1]
         assert routes[0].cost == pytest.approx(routes[1].cost, rel=ACCURACY)
+
+
+def test_curves_shortened_together_are_those_that_each_becomes_alone():
+    """Bit for bit: every curve takes its own steps, and every node its own corrections."""
+    eset = arch_set()
+    paths, demands = [], Demands.of(eset.structure, "length", eset.constraints, 0.0)
+    for begin, end in ARCH:
+        ends = stable_near(eset, begin), stable_near(eset, end)
+        paths.append(cheapest_path(eset, ends, demands))
+    together = Shortener(eset, demands).curves_near([each for each in paths if each is not None])
+    for path, curve in zip([each for each in paths if each is not None], together, strict=True):
+        alone = Shortener(eset, demands).curves_near([path])[0]
+        np.testing.assert_array_equal(curve.z, alone.z)
+        np.testing.assert_array_equal(curve.p, alone.p)

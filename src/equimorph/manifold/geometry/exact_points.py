@@ -190,21 +190,29 @@ def correct_between(
     middle: Float[np.ndarray, "lanes coordinates"],
     rows: Rows,
     around: Values,
+    following: float = FOLLOWING,
 ) -> Corrected:
     """Points of the set in the normal spaces of planes through middles, from states nearby.
 
-    Their tangent spaces and index are those at the start of the last step.
+    Their tangent spaces and index are those at the start of the last step; no step is taken that
+    would be shorter than `following`.
     """
     span = np.tile(np.eye(len(setting.free)), (len(middle), 1, 1))
     aim = Aim(setting, False, False, span, middle, rows)
-    found = _settle_guarded(aim, z, p, around, None, None)
+    found = _settle_guarded(aim, z, p, around, None, None, following)
     frames, good = np.zeros_like(found.frames), found.found
     frames[good] = found.frames[good]
     return Corrected(found.z, found.p, frames, found.index, good)
 
 
 def _settle_guarded(
-    aim: Aim, z: Lanes, p: Parameters, around: Values, lower: Numbers | None, index: Numbers | None
+    aim: Aim,
+    z: Lanes,
+    p: Parameters,
+    around: Values,
+    lower: Numbers | None,
+    index: Numbers | None,
+    following: float = FOLLOWING,
 ) -> Settled:
     """Newton's method with the guards of the set."""
     setting, centre = aim.setting, aim.centre(p)
@@ -212,7 +220,7 @@ def _settle_guarded(
     guards = Guards(
         longest=LONGEST,
         converged=LAST,
-        following=FOLLOWING,
+        following=following,
         trust=REACH * around + 1e-3,
         middle=centre,
         lower_index=lower,

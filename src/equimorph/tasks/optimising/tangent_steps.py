@@ -8,7 +8,7 @@ from equimorph.arrays import Flags, Float, Frames, Lanes, Parameters, Rows
 from equimorph.equilibria import settle
 from equimorph.equilibria.sensitivity import answers
 from equimorph.manifold import EquilibriumSet
-from equimorph.manifold.geometry.exact_points import Aim, correct_points
+from equimorph.manifold.geometry.exact_points import Aim, correct_between, correct_points
 from equimorph.manifold.geometry.setting import Setting, embed
 from equimorph.manifold.geometry.tangents import frames_in_embedding, split_step, tangent_frames
 from equimorph.manifold.queries.nearest import FAR, SetPoints
@@ -44,6 +44,18 @@ def step_along(
     """Points of the tangent spaces, off the set by the square of the step."""
     dz, dp = split_step(setting, np.einsum("ld,ldf->lf", steps, frames))
     return at.z + dz, at.p + dp
+
+
+def bend_onto_set(
+    setting: Setting, z: Lanes, p: Parameters, frames: Frames, error: float
+) -> tuple[Lanes, Parameters, Frames, Flags]:
+    """Points of the set orthogonally above points, with their tangents, and where there are any.
+
+    In planes along given tangents; up to an error in the metric.
+    """
+    rows, far = frames_in_embedding(setting, frames), np.full(len(z), FAR)
+    there = correct_between(setting, z, p, embed(setting, z, p), rows, far, error)
+    return there.z, there.p, there.frames, there.found
 
 
 def project_onto_set(

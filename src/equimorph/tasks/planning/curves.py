@@ -13,17 +13,18 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.linalg import solveh_banded
+from scipy.linalg.lapack import dpbsv
 
 from equimorph.arrays import Bool, Flags, Float, Frames, Int, Lanes, Parameters, Rows, Some, Values
 from equimorph.columns import Columns
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.geometry.setting import Setting, embed
+from equimorph.manifold.geometry.tangents import frames_in_embedding
 from equimorph.manifold.queries.nearest import SetPoints
-from equimorph.structures import States
+from equimorph.structures import States, join_states
 from equimorph.structures.margin import Pairs, first_pairs, softest_modes
 from equimorph.tasks.optimising.tangent_steps import (
-    project_onto_set,
+    bend_onto_set,
     step_along,
     tangent_planes,
     tangents_at,
@@ -33,6 +34,8 @@ from equimorph.tasks.planning.network import Demands
 
 NUDGE = 1e-4
 """Step along the tangents of the differences of constraints, in the metric."""
+OFF = 1e-10
+"""Distance of nodes from the set, in the metric: lifts begin where Newton's method ends."""
 MODE_ERROR = 1e-4
 """Error of margins, relative to their distance from the wall."""
 HELD = 0.1
@@ -64,8 +67,8 @@ class Curves(Columns):
     z: Lanes
     p: Parameters
     """The nodes."""
-    rows: Rows
-    """Planes near the tangent spaces."""
+    frames: Frames
+    """Orthonormal tangents."""
     walls: Walls
     """Distances from the walls, between the ends of the curves."""
     forces: Walls
@@ -113,25 +116,29 @@ class CurveSteps:
         """The set without its constraints: steps may cross these."""
         return unconstrained_setting(self.eset)
 
-    def curve(self, nodes: States) -> Curves | None:
-        """Curve through given stable states, its legs of equal shares; None if one meets a wall.
+    def curves(self, chains: Sequence[States]) -> list[Curves | None]:
+        """Curves through given stable states, legs of equal shares; None if one meets a wall.
 
         Nodes on walls are moved inside.
         """
-        count = len(nodes)
-        rows = tangent_planes(self.setting, nodes)
-        pairs = first_pairs(self.eset.structure, count)
-        floor, share = np.full(count, self.demands.margin), np.full(count, 1.0 / (count - 1))
-        share[0] = 1.0
-        walls, pairs, _ = self._walls(nodes.z, nodes.p, floor, pairs)
-        route = np.zeros(count, int)
-        curve = Curves(route, nodes.z, nodes.p, rows, walls, walls, pairs, floor, share)
-        margin = max(float(walls[:, 0].max()), SMALL)
+        structure, counts = self.eset.structure, np.array([len(each) for each in chains])
+        nodes, route = join_states(structure, chains), np.repeat(np.arange(len(chains)), counts)
+        share, floor = 1.0 / (counts - 1.0)[route], np.full(len(route), self.demands.margin)
+        share[np.cumsum(counts) - counts] = 1.0
+        at = SetPoints(nodes.z, nodes.p, tangent_planes(self.setting, nodes))
+        frames, _ = tangents_at(self.setting, at)
+        walls, pairs, _ = self._walls(nodes.z, nodes.p, floor, first_pairs(structure, len(route)))
+        every = Curves(route, nodes.z, nodes.p, frames, walls, walls, pairs, floor, share)
+        margin = np.full(len(chains), SMALL)
+        np.maximum.at(margin, route, walls[:, 0])
         sides = np.tile((self.eset.box.upper - self.eset.box.lower) / self.setting.scales, 2)
-        sizes = np.array([margin, *(each.size for each in self.demands.constraints), *sides])
-        distance = np.broadcast_to(INWARD * sizes, walls[1:-1].shape)
-        inner, good = self.inside(curve.take(slice(1, -1)), distance)
-        return curve.with_rows(curve.inner, inner) if good.all() else None
+        sizes = np.array([0.0, *(each.size for each in self.demands.constraints), *sides])
+        inner = every.inner
+        distance = np.tile(INWARD * sizes, (len(inner), 1))
+        distance[:, 0] = INWARD * margin[route[inner]]
+        moved, good = self.inside(every.take(inner), distance)
+        every, bad = every.with_rows(inner, moved), np.unique(route[inner[~good]])
+        return [None if k in bad else every.take(route == k) for k in range(len(chains))]
 
     def states(self, curves: Curves) -> States:
         """States at the nodes."""
@@ -161,41 +168,40 @@ class CurveSteps:
         self, curves: Curves, strengths: Each, values: Each, halvings: int
     ) -> tuple[Curves, Each]:
         """Curves after one step of each, and their values; as they were where no step lowers it."""
-        frames, at = tangents_at(self.setting, SetPoints(curves.z, curves.p, curves.rows))
-        curves = replace(curves, rows=at.rows)
-        step, push, share = self._newton_step(curves, frames, strengths)
-        out, lowest, todo = curves, values.copy(), np.unique(curves.route)
+        rows = frames_in_embedding(self.setting, curves.frames)
+        step, push, share = self._newton_step(curves, rows, strengths)
+        out, lowest, todo = (
+            curves,
+            values.copy(),
+            np.bincount(curves.route, minlength=len(values)) > 0,
+        )
         for _ in range(halvings):
-            some = np.flatnonzero(np.isin(curves.route, todo))
+            some = np.flatnonzero(todo[curves.route])
             part = share[curves.route[some], None]
             moved, good = self._moved(
-                curves.take(some), frames[some], part * step[some], part * push[some], strengths
+                _some(curves, todo), part * step[some], part * push[some], strengths
             )
             lower = np.full(len(values), np.inf)
-            fine = np.flatnonzero(good[moved.route])
-            lower[good] = self.values(moved.take(fine), strengths)[good]
+            lower[good] = self.values(_some(moved, good), strengths)[good]
             better = lower < values
+            if better[curves.route].all():
+                return moved, np.where(better, lower, lowest)
             rows = np.flatnonzero(better[moved.route])
-            out, lowest = (
-                out.with_rows(some[rows], moved.take(rows)),
-                np.where(better, lower, lowest),
-            )
-            todo = todo[~better[todo]]
-            if len(todo) == 0:
+            out = out.with_rows(some[rows], moved.take(rows))
+            lowest = np.where(better, lower, lowest)
+            todo &= ~better
+            if not todo.any():
                 break
             share[todo] *= 0.5
         return out, lowest
 
     def _moved(
-        self, curves: Curves, frames: Frames, step: Steps, push: Walls, strengths: Each
+        self, curves: Curves, step: Steps, push: Walls, strengths: Each
     ) -> tuple[Curves, Bool[np.ndarray, " routes"]]:
         """Curves with their inner nodes moved, and which of them stay on the set and inside."""
         inner, good = curves.inner, np.zeros(len(strengths), bool)
         own = curves.take(inner)
-        at = SetPoints(own.z, own.p, own.rows)
-        z, p = step_along(self.setting, at, frames[inner], step[inner])
-        there, found = project_onto_set(self.setting, z, p, own.rows)
-        moved, inside = self.placed(own, there)
+        moved, found, inside = self._placed(own, step[inner])
         beyond = np.flatnonzero(found & ~inside)
         if len(beyond):  # where a wall bends, they move along it
             again, inside[beyond] = self.inside(moved.take(beyond), own.walls[beyond])
@@ -209,7 +215,7 @@ class CurveSteps:
     def between(self, first: Curves, second: Curves) -> tuple[Curves, Flags]:
         """Nodes between pairs of nodes, and which of them are inside."""
         z, p = 0.5 * (first.z + second.z), 0.5 * (first.p + second.p)
-        middle = replace(second, z=z, p=p, rows=first.rows)
+        middle = replace(second, z=z, p=p, frames=first.frames)
         return self.inside(middle, 0.5 * (first.walls + second.walls))
 
     def inside(self, nodes: Curves, distance: Walls) -> tuple[Curves, Flags]:
@@ -217,13 +223,12 @@ class CurveSteps:
 
         Those with less than half of a given distance from a wall are moved there.
         """
-        setting, below = self.setting, replace(nodes, floor=nodes.floor - BELOW)
         far = ~np.isfinite(distance)  # as from a barrier where there is nothing to cross
         distance, scale = np.where(far, 0.0, distance), np.where(far, 1.0, distance)
-        there, found = project_onto_set(setting, nodes.z, nodes.p, nodes.rows)
-        todo = np.arange(len(found))
+        floor, still = nodes.floor, np.zeros((len(nodes.z), nodes.frames.shape[1]))
+        nodes, found, _ = self._placed(replace(nodes, floor=floor - BELOW), still)
+        todo, below = np.arange(len(found)), nodes
         for _ in range(PUSHES):
-            at, (below, _) = there.take(todo), self.placed(below, there.take(todo))
             lack = distance[todo] - below.walls
             lack[:, 0] += BELOW
             near = (lack > NEARER * distance[todo]).any(axis=1) & np.isfinite(lack.max(axis=1))
@@ -232,33 +237,39 @@ class CurveSteps:
                 break
             todo, below, lack = todo[some], below.take(some), lack[some]
             worst = (np.arange(len(todo)), (lack / scale[todo]).argmax(axis=1))
-            frames, at = tangents_at(setting, at.take(some))
-            slopes = self._slopes(below, frames)[worst]
+            slopes = self._slopes(below)[worst]
             push = lack[worst] / np.maximum((slopes**2).sum(axis=1), 1e-300)
-            z, p = step_along(setting, at, frames, push[:, None] * slopes)
-            moved, found[todo] = project_onto_set(setting, z, p, at.rows)
-            there = there.with_rows(todo, moved)
-        nodes, inside = self.placed(nodes, there)
+            below, found[todo], _ = self._placed(below, push[:, None] * slopes)
+            nodes = nodes.with_rows(todo, below)
+        nodes, inside = self._measured(replace(nodes, floor=floor))
         return nodes, found & inside
 
-    def placed(self, nodes: Curves, there: SetPoints) -> tuple[Curves, Flags]:
-        """Nodes elsewhere, and which of them no wall parts from the others."""
-        walls, pairs, inside = self._walls(there.z, there.p, nodes.floor, nodes.pairs)
-        moved = replace(nodes, z=there.z, p=there.p, rows=there.rows, walls=walls, pairs=pairs)
-        return moved, inside
+    def _placed(self, nodes: Curves, step: Steps) -> tuple[Curves, Flags, Flags]:
+        """Nodes after steps along their tangents, which are found, and which no wall parts."""
+        at = SetPoints(nodes.z, nodes.p, nodes.frames)
+        guess = step_along(self.setting, at, nodes.frames, step)
+        z, p, frames, found = bend_onto_set(self.setting, *guess, nodes.frames, OFF)
+        frames[~found] = nodes.frames[~found]
+        moved, inside = self._measured(replace(nodes, z=z, p=p, frames=frames))
+        return moved, found, inside
+
+    def _measured(self, nodes: Curves) -> tuple[Curves, Flags]:
+        """Nodes with their distances from walls, and which of them no wall parts from others."""
+        walls, pairs, inside = self._walls(nodes.z, nodes.p, nodes.floor, nodes.pairs)
+        return replace(nodes, walls=walls, pairs=pairs), inside
 
     def _newton_step(
-        self, curves: Curves, frames: Frames, strengths: Each
+        self, curves: Curves, rows: Rows, strengths: Each
     ) -> tuple[Steps, Walls, Each]:
         """Steps of all nodes, changes of the forces, and the share that keeps away from walls."""
-        inner, rows = curves.inner, curves.rows
+        inner = curves.inner
         place, d = embed(self.setting, curves.z, curves.p), rows.shape[1]
         pull = np.zeros_like(place)
         pull[1:] = np.diff(place, axis=0) / curves.share[1:, None]
         gradient = np.zeros((len(place), d))
         gradient[inner] = 2.0 * np.einsum("kde,ke->kd", rows[inner], pull[inner] - pull[inner + 1])
         own = curves.take(inner)
-        slopes = self._slopes(own, frames[inner])
+        slopes = self._slopes(own)
         barrier = (strengths[own.route] * curves.weights)[:, None] / own.walls
         gradient[inner] -= np.einsum("kw,kwd->kd", barrier, slopes)
         stiffness = own.forces / own.walls
@@ -293,16 +304,16 @@ class CurveSteps:
         walls = np.column_stack([found.first - floor, *excess, *sides])
         return walls, found.pairs, found.above & (walls > 0.0).all(axis=1)
 
-    def _slopes(self, nodes: Curves, frames: Frames) -> Float[np.ndarray, "nodes walls d"]:
+    def _slopes(self, nodes: Curves) -> Float[np.ndarray, "nodes walls d"]:
         """Slopes of the walls along the tangents.
 
         Those of a margin with mode w are ``wᵀ D²F[w, t]``, of constraints differences; walls that
         are infinite have none.
         """
-        structure, d = self.eset.structure, frames.shape[1]
+        structure, frames, d = self.eset.structure, nodes.frames, nodes.frames.shape[1]
         count, constraints = len(nodes.z), self.demands.constraints
         out = np.zeros((count, nodes.walls.shape[1], d))
-        at, still = SetPoints(nodes.z, nodes.p, nodes.rows), np.zeros_like(nodes.p)
+        at, still = SetPoints(nodes.z, nodes.p, frames), np.zeros_like(nodes.p)
         mode = np.ascontiguousarray(nodes.pairs[:, 0])
         units = np.repeat(np.eye(d)[:, None], count, axis=1)
         for k in range(d):
@@ -319,6 +330,12 @@ class CurveSteps:
         first = 1 + len(constraints)
         out[:, first:] = np.concatenate([steps, -steps], axis=1)
         return out
+
+
+def _some(curves: Curves, flags: Bool[np.ndarray, " routes"]) -> Curves:
+    """Some of the curves; those given if these are all."""
+    rows = flags[curves.route]
+    return curves if rows.all() else curves.take(rows)
 
 
 def join_curves(curves: Sequence[Curves]) -> Curves:
@@ -342,4 +359,6 @@ def solve_block_tridiagonal(
             if i + k < 2 * d:
                 columns = np.arange(i + k, count * d, d)
                 band[2 * d - 1 - k, columns] = rows[: len(columns), i, i + k]
-    return np.asarray(solveh_banded(band, rhs.ravel()).reshape(count, d))
+    _, found, info = dpbsv(band, rhs.ravel())
+    assert info == 0  # squares of lengths and of forces add up: the matrix is positive
+    return np.asarray(found.reshape(count, d))

@@ -17,11 +17,11 @@ from functools import cached_property
 
 import numpy as np
 
-from equimorph.arrays import Flags, Some, Values
+from equimorph.arrays import Flags, Parameters, Some, Values
 from equimorph.equilibria import settle
 from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.geometry.setting import embed
-from equimorph.structures import States
+from equimorph.structures import States, join_states
 from equimorph.structures.margin import softest_modes
 from equimorph.tasks.planning.corner_moves import chords
 from equimorph.tasks.planning.curves import (
@@ -73,8 +73,7 @@ class Shortener:
 
         Walls are as weak as lifts of all legs allow; None where they never do.
         """
-        starts = {k: self._curve_along(path, NODES) for k, path in enumerate(paths)}
-        todo = {k: start for k, start in starts.items() if start is not None}
+        todo = self._curves_along(paths, NODES)
         found = dict[int, Curves]()
         todo = self._link(todo, STRENGTHS, found) if todo else todo
         for strength in STRENGTHS[-2::-1]:
@@ -86,8 +85,7 @@ class Shortener:
 
         The fine curve begins with the rough one, its legs halved, unless it keeps a margin.
         """
-        along = {k: self._curve_along(path, FEW) for k, path in enumerate(paths)}
-        some = {k: curve for k, curve in along.items() if curve is not None}
+        some = self._curves_along(paths, FEW)
         best, found = 0, dict[int, Curves]()
         if some:
             rough = dict(zip(some, self._shorten(list(some.values()), STRENGTHS), strict=True))
@@ -99,30 +97,45 @@ class Shortener:
             return best, self._steps.states(found[best])
         return best, self.curves_near([paths[best]])[0]
 
-    def _curve_along(self, path: States, count: int) -> Curves | None:
-        """Curve along a path, of about so many nodes; None of one node, or if one meets a wall."""
-        nodes = self._nodes(path, count)
-        return None if nodes is None or len(nodes) < 2 else self._steps.curve(nodes)
+    def _curves_along(self, paths: Sequence[States], count: int) -> dict[int, Curves]:
+        """Curves along paths, of about so many nodes each.
 
-    def _nodes(self, path: States, count: int) -> States | None:
-        """States along a path, about as many as given; None if lifts fail.
-
-        Between states that are farther apart there are those of straight lifts.
+        Without those of one node, that meet a wall, or whose legs cannot be lifted. Between states
+        that are farther apart there are those of straight lifts.
         """
+        ways = [self._way_points(path, count) for path in paths]
+        lengths = [len(p) for _, p in ways]
+        if sum(lengths) == 0:
+            return {}
+        starts = join_states(self.eset.structure, [start for start, _ in ways])
+        p = np.concatenate([p for _, p in ways])
+        z, there, _ = lift_straight(starts, p, Demands(self.demands.objective))
+        chains, cuts = dict[int, States](), np.cumsum(lengths)[:-1]
+        split = (np.split(each, cuts) for each in (z, p, there))
+        for k, (own_z, own_p, arrived) in enumerate(zip(*split, strict=True)):
+            if arrived.all() and len(own_p):
+                path = join_states(
+                    paths[k].structure, [paths[k][0], States(starts.structure, own_z, own_p)]
+                )
+                at = np.concatenate([[0.0], np.cumsum(self._gaps(path))])
+                even = np.linspace(0.0, at[-1], count + 1)
+                nodes = np.unique(np.abs(at[:, None] - even).argmin(axis=0))
+                chains |= {k: path[nodes]} if len(nodes) > 1 else {}
+        found = self._steps.curves(list(chains.values())) if chains else []
+        return {k: curve for k, curve in zip(chains, found, strict=True) if curve is not None}
+
+    def _way_points(self, path: States, count: int) -> tuple[States, Parameters]:
+        """States from which to lift, and parameters, of about as many states as given on a path."""
         gap = self._gaps(path)
         parts = np.maximum(1, np.ceil(0.7 * count * gap / max(gap.sum(), 1e-300))).astype(int)
         leg = np.repeat(np.arange(len(parts)), parts)
-        share = np.concatenate([np.arange(1, each + 1) / each for each in parts])
+        first = np.repeat(np.cumsum(parts) - parts, parts)
+        share = (np.arange(len(leg)) - first + 1) / parts[leg]
         start, share = np.where(share == 1.0, leg + 1, leg), np.where(share == 1.0, 0.0, share)
-        p = path.p[start] + share[:, None] * (path.p[leg + 1] - path.p[start])
-        z, there, _ = lift_straight(path[start], p, Demands(self.demands.objective))
-        if not there.all():
-            return None
-        z, p = np.concatenate([path.z[:1], z]), np.concatenate([path.p[:1], p])
-        nodes = States(path.structure, z, p)
-        at = np.concatenate([[0.0], np.cumsum(self._gaps(nodes))])
-        even = np.linspace(0.0, at[-1], count + 1)
-        return nodes[np.unique(np.abs(at[:, None] - even).argmin(axis=0))]
+        p = path.p[start] + share[:, None] * (
+            path.p[np.minimum(leg + 1, len(path) - 1)] - path.p[start]
+        )
+        return path[start], p
 
     def _gaps(self, states: States) -> Values:
         place = embed(self._steps.setting, states.z, states.p)
@@ -216,19 +229,19 @@ class Shortener:
 
     def _with_walls(self, curves: Curves, count: int, strength: float, enough: float) -> Curves:
         """Curves after steps with walls of a strength, relative to the squared lengths."""
-        steps, active = self._steps, np.arange(count)
+        steps = self._steps
         strengths = strength * steps.squared_lengths(curves, count)
-        curves = steps.with_forces(curves, strengths)
+        rows, own = np.arange(len(curves.z)), steps.with_forces(curves, strengths)
         for _ in range(STEPS):
-            rows = np.flatnonzero(np.isin(curves.route, active))
-            own = curves.take(rows)
             value = steps.values(own, strengths)
             own, lower = steps.step(own, strengths, value, HALVINGS)
-            curves = curves.with_rows(rows, own)
-            active = active[(value - lower > enough * np.abs(value))[active]]
-            if len(active) == 0:
-                break
-        return curves
+            more = (value - lower > enough * np.abs(value))[own.route]
+            if not more.all():
+                curves = curves.with_rows(rows, own)
+                rows, own = rows[more], own.take(more)
+            if len(rows) == 0:
+                return curves
+        return curves.with_rows(rows, own)
 
     def _with_floors(self, curves: Curves) -> Curves:
         """Curves whose nodes keep as much margin as straight lifts between them lose.
