@@ -132,10 +132,7 @@ class Shortener:
         first = np.repeat(np.cumsum(parts) - parts, parts)
         share = (np.arange(len(leg)) - first + 1) / parts[leg]
         start, share = np.where(share == 1.0, leg + 1, leg), np.where(share == 1.0, 0.0, share)
-        p = path.p[start] + share[:, None] * (
-            path.p[np.minimum(leg + 1, len(path) - 1)] - path.p[start]
-        )
-        return path[start], p
+        return path[start], path.p[start] + share[:, None] * (path.p[leg + 1] - path.p[start])
 
     def _gaps(self, states: States) -> Values:
         place = embed(self._steps.setting, states.z, states.p)
