@@ -9,7 +9,6 @@ import pytest
 from equimorph.manifold import (
     EquilibriumSet,
     VertexKind,
-    build,
     equilibrium_set,
     level_set,
     refine,
@@ -308,22 +307,6 @@ def test_every_surface_around_a_grid_cell_of_the_arch_is_a_sphere(monkeypatch):
         for sign, each in ((1, points), (-1, edges // base**2), (1, owner))
     )
     assert (characteristic == 2).all()
-
-
-@pytest.mark.slow
-def test_what_a_bisection_leaves_is_found_only_once(monkeypatch):
-    """Doubtful tetrahedra are divided several times; to find everything anew gives the same set."""
-    monkeypatch.setitem(build.BISECTIONS, 3, 3)
-    box, grid = Box(a=(-1.1, 0.6), b=(-0.7, 0.8), c=(-0.9, 1.0)), (3, 3, 3)
-    at_once = lifted(swallowtail(), box, grid)
-    assert at_once.audit.bisected > 0
-    monkeypatch.setattr(cells, "volumes_over", lambda pairing, _: volumes_over(pairing, None))
-    anew = lifted(swallowtail(), box, grid)
-    assert at_once.audit == anew.audit
-    one, other = (projected_volume(eset, 0) for eset in (at_once, anew))
-    assert one == pytest.approx(other, rel=1e-12)
-    one, other = (eset.coordinates[np.lexsort(eset.coordinates.T)] for eset in (at_once, anew))
-    np.testing.assert_allclose(one, other, rtol=0, atol=1e-12)
 
 
 @pytest.mark.slow

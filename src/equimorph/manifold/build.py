@@ -291,6 +291,8 @@ class _Lifting:
             bisected += cells.doubtful
             chosen, exits = _longest_edges(pairing, cells), unseen.exits | ring_middles(pairing)
             exits |= strips_astray(pairing, cells.astray)
+            used = pairing.mesh.edges_in_use  # the last look may be some rounds ago
+            exits = {edge: share for edge, share in exits.items() if used[edge]}
             # first those through which tongues and strips leave their cells
             chosen = np.concatenate([np.array(list(exits), int), np.setdiff1d(chosen, list(exits))])
             pairing.use_mesh(bisect(pairing.mesh, chosen, exits))

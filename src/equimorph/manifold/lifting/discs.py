@@ -18,8 +18,8 @@ from equimorph.manifold.lifting.crossing_discs import (
     put_hubs,
     split_crossings,
 )
-from equimorph.manifold.lifting.fold_walks import fold_exits
-from equimorph.manifold.lifting.fold_ways import continuous_ways
+from equimorph.manifold.lifting.fold_walks import fold_exits, nearest_at
+from equimorph.manifold.lifting.fold_ways import followed_ways
 from equimorph.manifold.lifting.loops import Loops
 from equimorph.manifold.lifting.pairing import Pairing
 from equimorph.manifold.lifting.patterns import cut_by_pattern
@@ -39,6 +39,7 @@ from equimorph.manifold.lifting.polygon_cuts import (
     triangulate,
 )
 from equimorph.manifold.lifting.polygons import Polygon
+from equimorph.model import are_feasible
 
 BULGE = 0.2
 """How far corners may lie beyond a side of their grid triangle, as a barycentric coordinate: on
@@ -230,8 +231,8 @@ def _join_folds(pairing: Pairing, plans: list[Plan], found: _Found) -> list[Plan
     """Decide which folds of each polygon belong together; return plans where that is certain."""
     ways = [_ways(pairing, plan) for plan in plans]
     several = [k for k, each in enumerate(ways) if len(each) > 1]
-    continuous = continuous_ways(pairing, [plans[k] for k in several], [ways[k] for k in several])
-    for k, each in zip(several, continuous, strict=True):
+    followed = followed_ways(pairing, [plans[k] for k in several], [ways[k] for k in several])
+    for k, each in zip(several, followed, strict=True):
         ways[k] = each
     ways = join_crossings(plans, ways)
     decided = []
@@ -271,6 +272,7 @@ def _split_chords(pairing: Pairing, plans: list[Plan], found: _Found) -> None:
     folds = [(plan, chord) for plan, chord in blocked if plan.singular(chord[0]) == TURN]
     groups = _groups([plan for plan, _ in folds], [chord for _, chord in folds])
     extra = _pin(pairing, groups, [VertexKind.FOLD] * len(folds))
+    _follow_lost(pairing, groups, extra)
     for (plan, chord), point in zip(folds, extra, strict=True):
         if point is None:
             found.undecided.add(plan.polygon.triangle)
@@ -290,6 +292,20 @@ def _split_chords(pairing: Pairing, plans: list[Plan], found: _Found) -> None:
         if set(chord) <= set(plan.polygon.points)
     }
     found.undecided.update(split_crossings(pairing, plans, met))
+
+
+def _follow_lost(pairing: Pairing, groups: list[Group], points: list[int | None]) -> None:
+    """Points of folds that were not found between their ends: those that these pass as curves."""
+    store, constraints = pairing.points, pairing.setting.constraints
+    lost = [k for k, point in enumerate(points) if point is None]
+    pairs = [(groups[k].triangle, groups[k].points[0]) for k in lost]
+    for k, exit_ in zip(lost, fold_exits(pairing, pairs), strict=True):
+        ends = np.array(groups[k].points)
+        if exit_ is None or exit_.inside is None or nearest_at(pairing, exit_, ends[1:]) < 0:
+            continue
+        z, p = exit_.inside
+        if are_feasible(constraints, z[None], p[None])[0]:
+            points[k] = store.add(z, p, int(store.index[ends].min()), VertexKind.FOLD)
 
 
 def _chords_to_split(plan: Plan) -> list[Chord]:

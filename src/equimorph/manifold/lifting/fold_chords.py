@@ -20,6 +20,7 @@ from equimorph.manifold.geometry.simplices import shares_in
 from equimorph.manifold.geometry.tangents import fold_forms
 from equimorph.manifold.geometry.topology import labels, places_among
 from equimorph.manifold.lifting.courses import Courses, on_sides
+from equimorph.manifold.lifting.fold_walks import fold_exits, nearest_at
 from equimorph.manifold.lifting.grid import NEAR_AN_END
 from equimorph.manifold.lifting.pairing import Pairing
 from equimorph.manifold.lifting.polygon_cuts import chord_of, planes
@@ -150,6 +151,8 @@ def sharp_turns(pairing: Pairing, chords: FoldChords) -> Turns | None:
     sharp = chords.take(chords.sharp)
     parted = np.array([chord_of(*pair) in pairing.tips for pair in sharp.ends.tolist()], bool)
     sharp = sharp.take(~parted)
+    if pairing.mesh.dimension == 3:  # faces are not parted at middles: chords stand for arcs
+        sharp = sharp.take(~_lead_across(pairing, sharp))
     if len(sharp.ends) == 0:
         return None
     span = planes(pairing, sharp.triangle.tolist())
@@ -162,6 +165,19 @@ def sharp_turns(pairing: Pairing, chords: FoldChords) -> Turns | None:
     known = np.flatnonzero(inside)
     inside[known] = _lie_between(pairing, sharp.ends[known], middle.z[known], middle.p[known])
     return Turns(sharp.ends, sharp.triangle, sharp.normals, middle.z, middle.p, inside)
+
+
+def _lead_across(pairing: Pairing, chords: FoldChords) -> Flags:
+    """Whether folds lead from one end of their chords to the other without leaving the triangle."""
+    pairs = list(zip(chords.triangle.tolist(), chords.ends[:, 0].tolist(), strict=True))
+    exits = fold_exits(pairing, pairs)
+    return np.array(
+        [
+            exit_ is not None and nearest_at(pairing, exit_, end) >= 0
+            for exit_, end in zip(exits, chords.ends[:, 1:], strict=True)
+        ],
+        bool,
+    )
 
 
 def _lie_between(pairing: Pairing, ends: Pairs, z: Lanes, p: Parameters) -> Flags:

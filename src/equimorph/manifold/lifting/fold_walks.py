@@ -3,7 +3,8 @@
 In the plane of a triangle a fold is a curve on the set. Steps along its tangent are halved until
 their corrections are short and both tangents alike; the last one ends on the side itself.
 
-See docs/decisions.md, "Strips between a fold and a constraint are led along".
+See docs/decisions.md, "Folds are followed through their triangles" and "Strips between a fold and a
+constraint are led along".
 """
 
 from collections.abc import Sequence
@@ -11,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from equimorph.arrays import Float, Items, Lanes, Parameters, Values
+from equimorph.arrays import Float, Items, Lanes, Parameters, Some, Values
 from equimorph.columns import Columns
 from equimorph.manifold.geometry.exact_points import Aim, Pinned, correct_points
 from equimorph.manifold.geometry.points import VertexKind
@@ -63,6 +64,7 @@ def _follow(pairing: Pairing, triangle: Items, fold: Items) -> list[FoldExit | N
     setting = pairing.setting
     walk = _Walk.start_from(pairing, triangle, fold)
     left, edge = np.ones(len(fold), bool), np.full(len(fold), -1)
+    inside_z, inside_p, depth = walk.z.copy(), walk.p.copy(), np.zeros(len(fold))
     for _ in range(STEPS):
         lanes = np.flatnonzero(left)
         if len(lanes) == 0:
@@ -70,8 +72,14 @@ def _follow(pairing: Pairing, triangle: Items, fold: Items) -> list[FoldExit | N
         own, apex = walk.take(lanes).step(replace(setting, constraints=()))
         walk = walk.with_rows(lanes, own)
         there = np.flatnonzero(apex >= 0)
-        shares = shares_in(own.corners[there], own.p[there][:, setting.free])
-        edge[lanes[there]] = on_sides(pairing.mesh, triangle[lanes[there]], apex[there], shares)[0]
+        shares = shares_in(own.corners, own.p[:, setting.free])
+        deeper = (apex < 0) & (shares.min(axis=1) > depth[lanes])
+        known = lanes[deeper]
+        inside_z[known], inside_p[known] = own.z[deeper], own.p[deeper]
+        depth[known] = shares[deeper].min(axis=1)
+        edge[lanes[there]] = on_sides(
+            pairing.mesh, triangle[lanes[there]], apex[there], shares[there]
+        )[0]
         left[lanes[there]] = False
     found, out = edge >= 0, np.zeros(len(edge), bool)
     out[found] = ~are_feasible(setting.constraints, walk.z[found], walk.p[found])
@@ -80,7 +88,11 @@ def _follow(pairing: Pairing, triangle: Items, fold: Items) -> list[FoldExit | N
     walk.z[lanes], walk.p[lanes], edge[lanes] = corner.z, corner.p, -1
     found[lanes] = corner.found
     return [
-        FoldExit(int(edge[k]), walk.z[k], walk.p[k]) if good else None
+        FoldExit(
+            int(edge[k]), walk.z[k], walk.p[k], (inside_z[k], inside_p[k]) if depth[k] else None
+        )
+        if good
+        else None
         for k, good in enumerate(found.tolist())
     ]
 
@@ -112,12 +124,19 @@ def _corners(pairing: Pairing, walk: "_Walk", fold: Items) -> Pinned:
 
 def fold_at(pairing: Pairing, exit_: FoldExit) -> int:
     """Number of the known fold where a fold leaves a triangle, −1 if there is none."""
-    store, setting = pairing.points, pairing.setting
+    store = pairing.points
     own = store.edge[: store.count] == exit_.edge
-    folds = np.flatnonzero(own & (store.kind[: store.count] == VertexKind.FOLD))
-    place = embed(setting, store.z[folds], store.p[folds])
+    return nearest_at(
+        pairing, exit_, np.flatnonzero(own & (store.kind[: store.count] == VertexKind.FOLD))
+    )
+
+
+def nearest_at(pairing: Pairing, exit_: FoldExit, points: Some) -> int:
+    """That of some points at which a fold leaves a triangle or ends there, −1 if there is none."""
+    store, setting = pairing.points, pairing.setting
+    place = embed(setting, store.z[points], store.p[points])
     gap = np.linalg.norm(place - embed(setting, exit_.z[None], exit_.p[None]), axis=1)
-    return int(folds[gap.argmin()]) if (gap < NOISE).any() else -1
+    return int(points[gap.argmin()]) if (gap < NOISE).any() else -1
 
 
 @dataclass(frozen=True)

@@ -53,7 +53,8 @@ def _enter_layers(pairing: Pairing, astray: Int[np.ndarray, "a 4"]) -> bool:
             kept.append(one)
     if not kept:
         return False
-    entered = _enter(pairing, *(np.array(column) for column in zip(*kept, strict=True)))
+    edge, z, p = (np.array([getattr(each, name) for each in kept]) for name in ("edge", "z", "p"))
+    entered = _enter(pairing, edge, z, p)
     tried = {id(each) for each in new if fold_at(pairing, each) < 0}
     for key, each in pairing.exits.items():
         if id(each) in tried:

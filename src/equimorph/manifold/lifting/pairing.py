@@ -108,12 +108,14 @@ class Rays(Columns):
 class FoldExit(NamedTuple):
     """State at which a fold leaves a grid triangle, and the edge over which it lies.
 
-    −1 if it is a corner inside, where the fold meets a constraint.
+    edge: −1 if it is a corner inside, where the fold meets a constraint; inside: z and p of the
+    state passed on the way that lies deepest inside the triangle, if one was passed.
     """
 
     edge: int
     z: Float[np.ndarray, " size"]
     p: Float[np.ndarray, " parameters"]
+    inside: tuple[Float[np.ndarray, " size"], Float[np.ndarray, " parameters"]] | None
 
 
 @dataclass

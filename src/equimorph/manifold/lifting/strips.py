@@ -22,8 +22,7 @@ def strips_astray(pairing: Pairing, astray: Int[np.ndarray, "a 4"]) -> dict[int,
     sheets go on beside the fold, the side is split over the narrower of them. And sides over which
     rings close, in the middle of these.
     """
-    used = pairing.mesh.edges_in_use
-    out = {edge: share for edge, share in pairing.rings.items() if used[edge]}
+    out = dict(pairing.rings)
     if len(astray) == 0:
         return out
     triangle, fold = astray[:, 0], astray[:, 1]
