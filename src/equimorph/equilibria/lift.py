@@ -318,10 +318,10 @@ def lift(
         parameters, given as None, are then unknown and found on the way. A way-point for a
         descriptor is approached at a constant rate from its present value.
     within
-        Constraints, like ``[arch.max_curvature <= 10]``; the first violation ends the lift.
-        One that begins and ends inside a step may be missed where a constraint varies much faster
-        than states do: 75 of 4 860 such questions were answered wrongly, with steps of 0.02
-        (`options`) three, where a constraint comes within 1e-7 of its bound.
+        Constraints, like ``[arch.max_curvature <= 10]``; the first violation ends the lift, also
+        one that begins and ends inside a step, by more than 1e-9 of the bound or, if that is
+        smaller, of one. Only where a constraint has kinks, or varies over much less than a step
+        without a trace at its ends, may one be missed: shorter steps help (`options`).
     through_folds
         Continue around folds (and through branch points) instead of ending there. A path that
         turns back passes its start on another sheet: this ends it ("returned").

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from equimorph.arrays import Lanes, Numbers, Some
+from equimorph.arrays import Float, Lanes, Numbers, Some, Values
 from equimorph.equilibria.curves import Curve, squared_length
 from equimorph.equilibria.events import Events
 from equimorph.equilibria.locate import polish
@@ -17,11 +17,13 @@ from equimorph.equilibria.rows import Rows
 from equimorph.equilibria.steps import IN_CACHE, Front, Line, Workspace, compiled_steps
 from equimorph.equilibria.trace_options import TraceOptions
 from equimorph.errors import InputError
-from equimorph.marching import kernels, tick_kernels as ticks
+from equimorph.marching import constraint_kernels as violations, kernels, tick_kernels as ticks
 from equimorph.marching.judgement_kernels import judge
 from equimorph.marching.kernels import ARRIVAL, CONVERGED, ENDED, RETURN, STARTING
 from equimorph.model import Constraint
+from equimorph.structures import Advance
 from equimorph.structures.contract import CompiledSteps
+from equimorph.tolerances import METRIC_DIFFERENCE
 
 AT_GOAL, FROM_GOAL = 1e-9, 1e-6
 """Distance from an end of t, and of the states in the metric, from which Newton's method takes
@@ -186,7 +188,7 @@ class Block:
         _, doubtful, close = judge(
             move.index, move.determinant, *scalars, active, smallest, locates, plain
         )
-        if self._measure() or (locates and doubtful + close):
+        if self._measure(move) or (locates and doubtful + close):
             self.rare.judge(move)
         moved = (move.dz, move.tangent_z, move.tangent_t, move.index, move.determinant)
         files = rows.events.buffer, rows.points.buffer
@@ -197,19 +199,34 @@ class Block:
             self._close()
         return lost
 
-    def _measure(self) -> int:
-        """Values of constraints at starts and ends of steps; how many steps may graze one."""
+    def _measure(self, move: Advance) -> int:
+        """Values of constraints at starts and ends of steps; how many may hide a violation."""
         rows = self.rows
         at = np.flatnonzero((rows.stage == CONVERGED) | (rows.stage == STARTING))
         if len(self.constraints) == 0 or len(at) == 0:
             rows.grazing[:] = False
             return 0
-        here = self._here if len(at) == rows.active else self._here.take(at)
-        states = here.states(rows.places[2][at], rows.numbers[kernels.TRIAL, at])
-        for k, constraint in enumerate(self.constraints):
-            rows.values[3 * k + ticks.NEW, at] = constraint.excess(*states)
-        scalars = rows.numbers, rows.counts
-        return int(ticks.note_excess(rows.values, *scalars, rows.active, rows.grazing))
+        given = rows.values, rows.numbers, rows.counts, rows.active, rows.grazing
+        t = rows.numbers[kernels.TRIAL, at]
+        rows.values[violations.NEW :: violations.VALUES, at] = self._excess(
+            at, rows.places[2][at], t
+        )
+        if violations.note_excess(*given) == 0:
+            return 0
+        doubt = np.flatnonzero(rows.grazing[:, : rows.active].any(axis=0))
+        for row, end in enumerate((rows.front(doubt), rows.ahead(doubt, move)), violations.RISE):
+            dz, dt = METRIC_DIFFERENCE * end.tangent_z, METRIC_DIFFERENCE * end.tangent_t
+            ahead, behind = (
+                self._excess(doubt, end.z + s * dz, end.t + s * dt) for s in (1.0, -1.0)
+            )
+            slopes = (ahead - behind) / (2.0 * METRIC_DIFFERENCE)
+            rows.values[row :: violations.VALUES, doubt] = slopes
+        return int(violations.weigh(*given))
+
+    def _excess(self, at: Some, z: Lanes, t: Values) -> Float[np.ndarray, "constraints some"]:
+        """Excess over all bounds."""
+        states = self._here.take(at).states(z, t)
+        return np.array([constraint.excess(*states) for constraint in self.constraints])
 
     def _close(self) -> None:
         self.rows.close()

@@ -7,24 +7,19 @@ from dataclasses import replace
 
 import numpy as np
 
-from equimorph.arrays import Float, Lanes, Some, Values
+from equimorph.arrays import Some
 from equimorph.equilibria.curves import Curve
 from equimorph.equilibria.events import Events, events_at
 from equimorph.equilibria.inside_steps import NARROW, Span, inside_spans
-from equimorph.equilibria.legs import ON_BOUND
 from equimorph.equilibria.locate import locate_branch_point
 from equimorph.equilibria.rows import Rows
-from equimorph.equilibria.steps import least_inside
+from equimorph.equilibria.short_violations import hidden_violations
 from equimorph.equilibria.trace_options import EventCode, TraceOptions
 from equimorph.marching import kernels
 from equimorph.marching.judgement_kernels import NEAR
 from equimorph.marching.kernels import BRANCH, CONVERGED, EARLY, ENDING, HIDDEN, REFUSED
 from equimorph.model import Constraint
 from equimorph.structures import Advance
-from equimorph.tolerances import METRIC_DIFFERENCE
-
-MISS = 0.1
-"""Error of the largest value of a cubic inside a step, as a share of its rise above the ends."""
 
 
 class RareSteps:
@@ -43,40 +38,29 @@ class RareSteps:
             self._last.pop(lane, None)
 
     def judge(self, move: Advance) -> None:
-        """Refuse steps that jumped or graze constraints; locate what others hide."""
+        """Refuse steps that jumped or violate constraints; locate what others hide."""
         locates, what = self.options.locates_branch_points, self.rows.what
         good = self.rows.stage == CONVERGED
         branched = None
         if locates and (good & (what & BRANCH != 0)).any():
             branched = self._refuse_jumps(move)
-        good = self.rows.stage == CONVERGED
-        close = [np.flatnonzero(good & row[: len(good)]) for row in self.rows.grazing]
-        for k, at in enumerate(close):
+        for k, row in enumerate(self.rows.grazing):
+            at = np.flatnonzero((self.rows.stage == CONVERGED) & row[: len(what)])
             if len(at):
-                self._refuse_grazing(k, at, move)
+                self._refuse_violating(k, at, move)
         if branched is not None:
             self._note_branch_points(branched)
         if locates and (what & (HIDDEN | EARLY) != 0).any():
             self._look_inside(move)
 
-    def _refuse_grazing(self, k: int, at: Some, move: Advance) -> None:
-        """Refuse steps inside which the cubic through values and slopes may exceed the bound.
-
-        The next try ends where the cubic is largest, where it is exact after a few tries.
-        """
-        rows, constraint = self.rows, self.constraints[k]
-        here, length = self.curve.take(rows.lanes[at]), rows.numbers[kernels.LENGTH, at]
-        values = rows.values[3 * k + 1, at], rows.values[3 * k + 2, at]
-        ends = rows.front(at), rows.ahead(at, move)
-        slopes = [
-            _slope(here, constraint, end.z, end.t, end.tangent_z, end.tangent_t) for end in ends
-        ]
-        share, least = least_inside((-values[0], -values[1]), (-slopes[0], -slopes[1]), length)
-        rise = -least - np.maximum(*values)
-        grazing = (rise > ON_BOUND * constraint.size) & (least < MISS * rise)
-        rows.stage[at[grazing]] = REFUSED
-        wanted = np.clip(share, 0.1, 0.9) * length / kernels.BACK
-        rows.numbers[kernels.LENGTH, at[grazing]] = wanted[grazing]
+    def _refuse_violating(self, k: int, at: Some, move: Advance) -> None:
+        """Refuse steps inside which a constraint is violated; the next try ends where it is."""
+        rows, bracket = self.rows, self.rows.bracket(at, move)
+        curve = self.curve.take(bracket.lanes)
+        found = hidden_violations(curve, self.constraints[k], bracket)
+        over = np.isfinite(found)
+        rows.stage[at[over]] = REFUSED
+        rows.numbers[kernels.LENGTH, at[over]] = found[over] / kernels.BACK
 
     def _refuse_jumps(self, move: Advance) -> Events:
         """Refuse changes of index or direction without a fold or branch point; the branch points.
@@ -156,20 +140,3 @@ class RareSteps:
         first = np.where(low, start, np.nan)
         begun = np.where(low, behind, start)
         return Span(at, before, bracket.after, begun, start + bracket.step, first)
-
-
-def _slope(
-    curve: Curve,
-    constraint: Constraint,
-    z: Lanes,
-    t: Values,
-    tangent_z: Lanes,
-    tangent_t: Values,
-) -> Float[np.ndarray, " lanes"]:
-    """Change of a constraint's excess per length along curves."""
-    h = METRIC_DIFFERENCE
-    ahead, behind = (
-        constraint.excess(*curve.states(z + s * h * tangent_z, t + s * h * tangent_t))
-        for s in (1.0, -1.0)
-    )
-    return np.asarray((ahead - behind) / (2.0 * h))

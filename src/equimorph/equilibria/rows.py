@@ -7,6 +7,7 @@ from equimorph.equilibria.steps import Bracket, EventFile, Front, PointFile, new
 from equimorph.equilibria.trace_options import TraceOptions
 from equimorph.linalg.simd import LANES
 from equimorph.marching import kernels, step_kernels, tick_kernels as ticks
+from equimorph.marching.constraint_kernels import VALUES
 from equimorph.structures import Advance
 
 
@@ -33,7 +34,7 @@ class Rows:
         self.places = tuple(np.zeros(shape) for shape in shapes)
         self.flat = tuple(place.reshape(rows, -1) for place in self.places)
         self.numbers, self.counts = new_scalars(_apart(rows))
-        self.values = np.zeros((3 * constraints, rows))
+        self.values = np.zeros((VALUES * constraints, rows))
         self.grazing = np.zeros((constraints, rows), bool)
         self.state = np.zeros(6, np.int64)
         self.events = EventFile(size, events + rows, self.state)

@@ -94,8 +94,13 @@ def step_along(curve: Curve, front: Front, length: Values) -> tuple[Front, Flags
     found = settle(AlongCurve(curve), z, p, directions, (), guards, plane)
     tangent_z, tangent_t = np.ascontiguousarray(found.frames[:, 0, :-1]), found.frames[:, 0, -1]
     there = Front(found.z, found.p[:, 0].copy(), tangent_z, tangent_t * unit, found.index)
-    cosine = kernels.row_sums(row, there.tangent_z) + corner * there.tangent_t
-    return there, found.found & (cosine >= kernels.LEAST_COSINE)
+    return there, found.found & (along_tangents(curve, front, there) >= kernels.LEAST_COSINE)
+
+
+def along_tangents(curve: Curve, front: Front, there: Front) -> Values:
+    """Cosines of the angles between tangents of points and those of `front`."""
+    row, corner = dual(curve.metric, curve.weight, front.tangent_z, front.tangent_t)
+    return np.asarray(kernels.row_sums(row, there.tangent_z) + corner * there.tangent_t)
 
 
 def new_scalars(

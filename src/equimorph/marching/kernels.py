@@ -21,15 +21,16 @@ INLINE = {**SUMS, "forceinline": True}
 (
     T, SLOPE, T_1, SLOPE_1, T_2, SLOPE_2, X_1, RATE_1, X_2, RATE_2, ARC, TRIAL, CORNER, DEFECT,
     LENGTH, TRAVELLED, LAST, WEIGHT, LARGEST, TURNING, NEW_SLOPE, NORM, TURN, DET_OLD, DET, NEW_DET,
-    GAIN, BEND, UNIT,
-) = range(29)  # fmt: skip
+    GAIN, BEND, UNIT, BESIDE,
+) = range(30)  # fmt: skip
 """Rows of `numbers`: t and dt/ds here, one step before and two; where those two lie along the
 tangent here, and the cosines of theirs; arclength of the step before; t, closing equation and
 length of the step that is tried; way so far; last correction; squared weight of dt; knobs; dt/ds at
 the end, length of the tangent and turning angle of a step that converged; determinant of F_z at the
 step before, here and at the end; last correction over the square of the one before; turning angle
-per length of the last step; power of two in which all determinants of the lane are measured."""
-NUMBERS = 29
+per length of the last step; power of two in which all determinants of the lane are measured; t
+beside an end of the step."""
+NUMBERS = 30
 
 LANE, STAGE, ITERATION, INDEX, NEW_INDEX, WHAT, STEPS, MOST, LEVEL, HEAD, KNOWN = range(11)
 """Rows of `counts`: number of the lane; stage; Newton steps so far; index here and at the end of

@@ -9,13 +9,23 @@ import numpy as np
 from equimorph.linalg.compiled import njit, template
 from equimorph.linalg.kernels import FLAGS
 from equimorph.linalg.simd import LANES
+from equimorph.marching.constraint_kernels import (
+    EARLIER,
+    HERE,
+    LAST,
+    NEW,
+    VALUES,
+    beside,
+    note_excess,
+    note_slopes,
+    weigh,
+)
 from equimorph.marching.event_kernels import file_events, file_points
 from equimorph.marching.judgement_kernels import judge
 from equimorph.marching.kernels import (
     ACCEPTED,
-    ARC,
+    BESIDE,
     BRANCH,
-    CONSTRAINT,
     CONVERGED,
     CORNER,
     DEFECT,
@@ -23,7 +33,6 @@ from equimorph.marching.kernels import (
     HELD,
     HIDDEN,
     LANE,
-    LENGTH,
     NEARLY,
     STAGE,
     STARTING,
@@ -46,8 +55,6 @@ prediction; closing of gaps."""
 IDLE, UNSAFE, RARE, LOST = range(4)
 """Why `march` returns: nothing is left to do, or files are full; a pivot is unsafe; steps are
 doubtful, may hide something or graze a constraint; lanes are given up."""
-LAST, HERE, NEW = range(3)
-"""Rows of the values of each constraint: at the step before, here, and at the end of the step."""
 PATIENCE = 1000
 """Steps that lanes may spend waiting for others: as long as it takes to judge rare steps, or to
 solve with unsafe pivots."""
@@ -65,37 +72,6 @@ def refill(start, weight, lanes, levels, places, numbers, counts, state):
 
 
 @njit(**{**SUMS, "_nrt": True})
-def note_excess(values, numbers, counts, active, grazing):
-    """Note violated constraints, and those that may be violated inside steps only.
-
-    By values at the step before, here and at the end: how far they may rise in between, and whether
-    they may fall at the end. Returns how many such steps there are.
-    """
-    found = 0
-    for k in range(grazing.shape[0]):
-        for i in range(active):
-            grazing[k, i] = False
-            if counts[STAGE, i] != CONVERGED:
-                continue
-            here, new = values[3 * k + HERE, i], values[3 * k + NEW, i]
-            if new > 0.0:
-                counts[WHAT, i] |= CONSTRAINT
-            before, length = numbers[ARC, i], numbers[LENGTH, i]
-            room, rise = -max(here, new), new - here
-            reach, peak = abs(rise), True
-            if before > 0.0:
-                slope, earlier = rise / length, (here - values[3 * k + LAST, i]) / before
-                change = slope - earlier
-                reach = max(reach, abs(change) * length)
-                start = earlier + change * before / (before + length)
-                end = slope + change * length / (before + length)
-                peak = start + abs(change) > 0.0 and end - abs(change) < 0.0
-            grazing[k, i] = peak and 0.0 < room < reach
-            found += grazing[k, i]
-    return found
-
-
-@njit(**{**SUMS, "_nrt": True})
 def finish(move, mass, knobs, places, numbers, counts, values, files, state, rules):
     """File events and points of good steps, and take all lanes on to their next prediction.
 
@@ -103,12 +79,16 @@ def finish(move, mass, knobs, places, numbers, counts, values, files, state, rul
     """
     smallest, _, _, stops, records = rules
     active = state[ACTIVE]
-    for k in range(0, values.shape[0], 3):
+    for k in range(0, values.shape[0], VALUES):
         for i in range(active):
             if counts[STAGE, i] == CONVERGED:
-                values[k + LAST, i], values[k + HERE, i] = values[k + HERE, i], values[k + NEW, i]
+                values[k + EARLIER, i], values[k + LAST, i] = (
+                    values[k + LAST, i],
+                    values[k + HERE, i],
+                )
+                values[k + HERE, i] = values[k + NEW, i]
             elif counts[STAGE, i] == STARTING:
-                values[k + LAST, i], values[k + HERE, i] = np.nan, values[k + NEW, i]
+                values[k + HERE, i] = values[k + NEW, i]
     events, points = files
     state[EVENTS] = file_events(
         move[1], stops, places, numbers, counts, active, events, state[EVENTS]
@@ -119,15 +99,15 @@ def finish(move, mass, knobs, places, numbers, counts, values, files, state, rul
 
 
 @njit(**{**FLAGS, "_nrt": False})
-def _on_lines(line, numbers, counts, at, count, p):
-    """Parameters of lanes `at` at their trial points.
+def _on_lines(line, times, counts, at, count, p):
+    """Parameters of lanes `at` at their places `times` on straight lines.
 
     Products are stored before the sums: in one loop they would be rounded together, unlike those of
     the general path.
     """
     start, velocity = line[0], line[1]
     for i in range(count):
-        lane, t = counts[LANE, at[i]], numbers[TRIAL, at[i]]
+        lane, t = counts[LANE, at[i]], times[at[i]]
         for c in range(p.shape[1]):
             p[i, c] = t * velocity[lane, c]
     for i in range(count):
@@ -145,7 +125,7 @@ def lay_out(line, trial, row, numbers, counts, active, scratch):
     p, dp, at, force, growth = scratch[0], scratch[1], scratch[4], scratch[6], scratch[7]
     for i in range(active):
         at[i] = i
-    _on_lines(line, numbers, counts, at, active, p)
+    _on_lines(line, numbers[TRIAL], counts, at, active, p)
     for i in range(active):
         lane = counts[LANE, i]
         for c in range(p.shape[1]):
@@ -179,9 +159,15 @@ def gather(line, trial, numbers, counts, active, z, p, at):
                 z[count, j] = trial[i, j]
             at[count] = i
             count += 1
+    return fill(line, numbers[TRIAL], counts, count, z, p, at)
+
+
+@njit(**{**FLAGS, "_nrt": False})
+def fill(line, times, counts, count, z, p, at):
+    """Parameters at places on lines, and copies of the last one to fill a vector; how many."""
     if count == 0:
         return 0
-    _on_lines(line, numbers, counts, at, count, p)
+    _on_lines(line, times, counts, at, count, p)
     for i in range(count, LANES):
         for j in range(z.shape[1]):
             z[i, j] = z[count - 1, j]
@@ -280,8 +266,8 @@ def march_of(step, excess):
     """
 
     @template(**FLAGS)
-    def measure(work, tables, bounds, line, block, scratch):
-        """Values of constraints at starts and ends of good steps; which steps may graze one."""
+    def measure(work, tables, bounds, line, block, tangent, scratch):
+        """Values of constraints at starts and ends of good steps; which may hide a violation."""
         places, _, numbers, counts, values, grazing, state = block
         if grazing.shape[0] == 0:
             return
@@ -291,8 +277,15 @@ def march_of(step, excess):
             excess(work, tables, z[:count], p[:count], bounds, found)
             for k in range(grazing.shape[0]):
                 for i in range(count):
-                    values[3 * k + NEW, at[i]] = found[k, i]
-        note_excess(values, numbers, counts, state[ACTIVE], grazing)
+                    values[VALUES * k + NEW, at[i]] = found[k, i]
+        if note_excess(values, numbers, counts, state[ACTIVE], grazing) == 0:
+            return
+        for side in range(4):
+            count = beside(side, places, tangent, numbers, counts, state[ACTIVE], grazing, z, at)
+            n = fill(line, numbers[BESIDE], counts, count, z, p, at)
+            excess(work, tables, z[:n], p[:n], bounds, found)
+            note_slopes(side, found, count, at, values)
+        weigh(values, numbers, counts, state[ACTIVE], grazing)
 
     @template(**FLAGS)
     def march(work, tables, bounds, problem, queue, block, move, files, scratch, rules):
@@ -327,10 +320,11 @@ def march_of(step, excess):
                 correct(dz, dt, tangent, slope, *around, ACCEPTED, NEARLY)
                 correct_arrivals(dz, tangent, slope, mass, places, numbers, counts, active)
                 judge(index, determinant, numbers, counts, active, smallest, locates, plain)
-                measure(work, tables, bounds, line, block, scratch)
+                measure(work, tables, bounds, line, block, tangent, scratch)
                 state[PHASE] = FINISH
                 if _assemble(tangent, row, counts, grazing, state, locates):
                     note_excess(values, numbers, counts, active, grazing)
+                    weigh(values, numbers, counts, active, grazing)
                     return RARE
             if state[PHASE] == FINISH:
                 _, given_up = finish(
