@@ -253,22 +253,24 @@ def test_vertices_on_edges_are_looked_for_near_the_surface():
         frame[:, :, 0] /= 2.0
         ends = np.stack([np.arange(40), 40 + np.arange(40)], axis=1)
         flat, t = np.empty((40, 2, 2)), np.full(40, 0.5)
-        lean_edges(z, p, rows, metric, ends, flat)
+        place = np.column_stack([2.0 * z, there])
+        lean_edges(place, rows, ends, flat)
         out = np.empty((40, 1)), np.empty((40, 3)), np.empty((40, 3)), np.empty((40, 2, 3))
         out = *out, np.empty(40)
-        bend_edges(z, p, frame, rows, metric, ends, t, np.zeros(2, bool), flat, out)
+        vertices = z, p, place, frame, rows
+        bend_edges(vertices, metric, ends, t, np.zeros(2, bool), flat, out)
         own = out[1][:, [0, 2]] / scales
         height = own @ slope + 0.5 * np.einsum("ni,ij,nj->n", own, curvature, own)
         errors.append(np.abs(out[0][:, 0] - height).max())
         assert np.all(out[1][:, 1] == 7.0)
         assert np.allclose(out[2], np.column_stack([2.0 * out[0], own]), atol=1e-14)
         found, told = np.ones(40, bool), (out[0], out[1], frame[:40])
-        check_edges(z, p, metric, ends, t, (out[2], out[4]), (0.3, 0.35, 0.5), told, found)
+        check_edges(place, metric, ends, t, (out[2], out[4]), (0.3, 0.35, 0.5), told, found)
         assert found.all()
         across = np.cross(rows[:40, 0], rows[:40, 1])[:, None] / np.array([2.0, 1.0, 1.0])
         steep = np.concatenate([across, across], axis=1)  # a plane across the edge
         check_edges(
-            z, p, metric, ends, t, (out[2], out[4]), (0.3, 0.35, 0.5), (*told[:2], steep), found
+            place, metric, ends, t, (out[2], out[4]), (0.3, 0.35, 0.5), (*told[:2], steep), found
         )
         assert not found.any()
     assert errors[1] < 0.1 * errors[0] < 1e-4

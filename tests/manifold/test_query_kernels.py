@@ -6,6 +6,8 @@ from scipy.spatial import Delaunay
 
 import equimorph as em
 from equimorph.equilibria import Guards, settle
+from equimorph.manifold.geometry.kernels import measure_edges
+from equimorph.manifold.geometry.tangents import S_SHAPE, Cubics, Ends
 from equimorph.manifold.lookup.cell_index import NUDGE, CellIndex, meeting_boxes
 from equimorph.manifold.lookup.exact_states import CLOSEST, ROUND_OFF, exact_states, root_weights
 from equimorph.manifold.lookup.kernels import (
@@ -15,6 +17,7 @@ from equimorph.manifold.lookup.kernels import (
     one_of_each,
     worth_trying,
 )
+from equimorph.manifold.refining.kernels import see_volumes
 from equimorph.structures import Spring
 
 
@@ -203,3 +206,23 @@ def test_cells_are_listed_in_each_bin_that_they_reach(counts):
     for number, place in enumerate(np.ndindex(*counts)):
         wanted = np.flatnonzero(((first <= place) & (place <= last)).all(axis=1))
         np.testing.assert_array_equal(cells[starts[number] : starts[number + 1]], wanted)
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_cells_are_measured_in_the_tangent_spaces_as_by_numpy(d):
+    """Volumes seen from corners; and the cubics over edges, with nothing that stays zero on them.
+
+    Round-off: sums of nine terms near one.
+    """
+    generator = np.random.default_rng(d)
+    place = generator.normal(size=(30, 9))
+    rows = np.linalg.qr(generator.normal(size=(30, 9, d)))[0].transpose(0, 2, 1).copy()
+    cells = np.stack([generator.permutation(30)[: d + 1] for _ in range(40)])
+    seen, sides = np.empty(cells.shape), place[cells[:, 1:]] - place[cells[:, :1]]
+    see_volumes(place, rows, cells, seen)
+    flat = np.einsum("nic,nkjc->nkij", sides, rows[cells])
+    np.testing.assert_allclose(seen, np.linalg.det(flat), atol=1e-12)
+    ends, error = cells[:, :2].copy(), np.empty(40)
+    measure_edges(place, rows, ends, S_SHAPE, error)
+    free = [Ends(place[end], rows[end], np.zeros((40, 0, d))) for end in ends.T]
+    np.testing.assert_allclose(error, Cubics(*free).error, rtol=1e-12)

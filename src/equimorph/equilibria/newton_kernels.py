@@ -4,9 +4,9 @@ import numpy as np
 
 from equimorph.linalg.compiled import njit
 from equimorph.linalg.dense_kernels import solve_by_rows
-from equimorph.linalg.kernels import FLAGS
+from equimorph.linalg.kernels import FLAGS, SUMS
 from equimorph.linalg.row_kernels import copy_row
-from equimorph.structures.newton_kernels import SINGULAR, UNFINISHED, stand_after
+from equimorph.structures.newton_kernels import OPEN, SINGULAR, UNFINISHED, stand_after
 
 DEPENDENT = 1e-14
 """Determinant of a small matrix, relative to its entries, that counts as zero."""
@@ -112,13 +112,13 @@ def null_lanes(x, size, k, b, null):
             null[lane, size] += share * beta
 
 
-@njit(**FLAGS)
-def along_lanes(step, tangents, rows, x, steepness):
+@njit(**{**FLAGS, "fastmath": SUMS})
+def along_lanes(step, tangents, rows, along, onto, steepness):
     """Directions along the set that rows see as unit vectors, and the step that they do not see.
 
     From a step (lanes, size) at fixed parameters, tangents (lanes, k, size), and rows (lanes, k,
-    size + k): x (lanes, k + 1, size + k), the step last; steepness: largest entry of tangents, not
-    a number where one is not.
+    size + k): along (lanes, k, size + k) and onto (lanes, size + k); steepness: largest entry of
+    tangents, not a number where one is not.
     """
     k, size = tangents.shape[1:]
     seen = np.empty((k, 2 * k))
@@ -139,19 +139,80 @@ def along_lanes(step, tangents, rows, x, steepness):
         solve_by_rows(seen, k)
         for i in range(k):
             for n in range(size):
-                x[lane, i, n] = 0.0
+                along[lane, i, n] = 0.0
             for j in range(k):
                 share = seen[j, k + i]
                 for n in range(size):
-                    x[lane, i, n] += share * tangents[lane, j, n]
-                x[lane, i, size + j] = share
+                    along[lane, i, n] += share * tangents[lane, j, n]
+                along[lane, i, size + j] = share
         for n in range(size):
-            x[lane, k, n] = step[lane, n]
+            onto[lane, n] = step[lane, n]
         for n in range(k):
-            x[lane, k, size + n] = 0.0
+            onto[lane, size + n] = 0.0
         for i in range(k):
             share = 0.0
             for n in range(size):
                 share += rows[lane, i, n] * step[lane, n]
             for n in range(size + k):
-                x[lane, k, n] -= share * x[lane, i, n]
+                onto[lane, n] -= share * along[lane, i, n]
+
+
+@njit(**{**FLAGS, "fastmath": SUMS})
+def correct_onto(moves, work, count, result, too_long, weights, limits, longest, rule):
+    """Apply steps onto the set to the lanes at work; return how many go on, moved to the front.
+
+    moves: orthonormal directions along the set (lanes, k, size + k), the step, the index, and
+    whether that is sure; work, a row each lane at work: number, length of the step before, z, p,
+    directions, rows that see those along the set; count: how many rows these are; result, a row
+    each lane: z, p, status, size, first size, index, directions along the set, sure; weights: of
+    squares in the metric, and of those in lengths; limits and too_long: see `stand_after`; longest:
+    to which steps are shortened; rule: whether lengths need not shrink yet, whether this is the
+    last step, whether it is the first one, and whether rows follow the directions, and steps are
+    made orthogonal to these.
+    """
+    along, onto, index, sure = moves
+    lane, before, z, p, directions, rows = work
+    out_z, out_p, status, size, first, out_index, frames, out_sure = result
+    metric, weight = weights
+    free, last, is_first, follows = rule
+    (k, width), entries, parameters, left = rows.shape[1:], z.shape[1], p.shape[1], 0
+    for i in range(count):
+        own, squared = lane[i], 0.0
+        for j in range(k if follows else 0):
+            share = 0.0
+            for n in range(width):
+                share += metric[n] * onto[i, n] * along[i, j, n]
+            for n in range(width):
+                onto[i, n] -= share * along[i, j, n]
+        for n in range(width):
+            squared += weight[n] * onto[i, n] * onto[i, n]
+        length = np.sqrt(squared)
+        state = stand_after(length, before[i], limits, too_long[own], free, last)
+        size[own] = length
+        if is_first:
+            first[own] = length
+        share = longest / length if length > longest else 1.0
+        if state <= UNFINISHED:
+            for n in range(entries):
+                z[i, n] += share * onto[i, n]
+            for j in range(k):
+                for n in range(parameters):
+                    p[i, n] += share * onto[i, entries + j] * directions[i, j, n]
+        if state != OPEN:
+            copy_row(z, i, out_z, own)
+            copy_row(p, i, out_p, own)
+            status[own], out_index[own], out_sure[own] = state, index[i], sure[i]
+            for j in range(k):
+                for n in range(width):
+                    frames[own, j, n] = along[i, j, n]
+            continue
+        lane[left], before[left] = own, length
+        copy_row(z, i, z, left)
+        copy_row(p, i, p, left)
+        for j in range(k):
+            for n in range(parameters):
+                directions[left, j, n] = directions[i, j, n]
+            for n in range(width):
+                rows[left, j, n] = metric[n] * along[i, j, n] if follows else rows[i, j, n]
+        left += 1
+    return left

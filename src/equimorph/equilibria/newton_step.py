@@ -7,16 +7,13 @@ import numpy as np
 from equimorph.arrays import Directions, Flags, Float, Int, Lanes, Numbers, Parameters, Some, Values
 from equimorph.columns import Columns
 from equimorph.equilibria.critical import Critical, null_border
-from equimorph.equilibria.newton_kernels import along_lanes, amount_lanes, move_lanes, null_lanes
+from equimorph.equilibria.newton_kernels import amount_lanes, move_lanes, null_lanes
 from equimorph.equilibria.point_conditions import Condition, Linear, Move
 from equimorph.linalg import orthonormal_rows
 from equimorph.structures import Equations, LinearSystem, Structure
 
 DOUBTFUL = 1e-4
 """Pivot ratio below which the index is counted anew."""
-STEEPEST = 1e3
-"""Entry of a tangent, for changes of the parameters by their scales, from which on its space is
-found by a bordered solve: near folds tangents over the parameters lose as many digits."""
 RANK = 1e-12
 """Smallest singular value of slopes, relative to the largest one, that counts as zero; their
 determinant is `DEPENDENT` then."""
@@ -101,6 +98,12 @@ class Problem:
         return alone and not (self.unfolded or isinstance(self.frame, Tangents))
 
     @property
+    def onto_set(self) -> bool:
+        """Whether F = 0 is all, in few enough free directions for the structure's fused steps."""
+        alone = not (self.conditions or self.unfolded or isinstance(self.frame, Held))
+        return alone and 0 < self.width <= self.structure.fused_directions
+
+    @property
     def critical(self) -> bool:
         """Whether a border of F_z is needed."""
         return self.unfolded or any(each.critical for each in self.conditions)
@@ -143,6 +146,16 @@ class Step:
     tangent: Tangent
     slopes: Float[np.ndarray, "lanes m k"]
     null: Lanes | None
+
+
+Bordered = tuple[
+    Float[np.ndarray, "lanes columns bordered"],
+    Numbers,
+    Flags,
+    LinearSystem,
+    Float[np.ndarray, "lanes extended"] | None,
+]
+"""Directions and step, index, whether it is sure, the system and (v, g), as in `Tangent`."""
 
 
 @dataclass(frozen=True)
@@ -195,28 +208,9 @@ class Points(Columns):
 
     def tangent(self) -> Tangent:
         """Newton step onto the set where the rows vanish, and directions along the set."""
-        problem, structure = self.problem, self.problem.structure
-        if problem.width == 0 or isinstance(problem.frame, Held):
+        if self.problem.width == 0 or isinstance(self.problem.frame, Held):
             return self._over_parameters()
-        alone = not (problem.conditions or problem.unfolded)
-        if alone and problem.width <= structure.fused_directions:
-            return self._by_response()
-        return self._bordered()
-
-    def _by_response(self) -> Tangent:
-        """The same from the step at fixed parameters and its tangents; bordered near folds."""
-        problem = self.problem
-        out = problem.structure.respond(self.z, self.p, problem.directions)
-        steepness = np.empty(len(self.z))
-        x = np.empty((len(self.z), problem.width + 1, self.rows.shape[2]))
-        along_lanes(out.dz, out.tangents, self.rows, x, steepness)
-        told = self._frame(x, out.index, out.ratio >= DOUBTFUL)
-        steep = np.flatnonzero(~(steepness < STEEPEST) | np.isnan(out.ratio))
-        if len(steep):
-            again = self.take(steep)._bordered()
-            for name in ("onto", "along", "index", "sure"):
-                getattr(told, name)[steep] = getattr(again, name)
-        return told
+        return self._frame(*self.bordered())
 
     def _frame(
         self,
@@ -237,8 +231,8 @@ class Points(Columns):
         onto = np.ascontiguousarray(along[:, width] if many > width else x[:, width])
         return Tangent(onto, along[:, :width], index, sure, system, null)
 
-    def _bordered(self) -> Tangent:
-        """The same by the bordered system, which is regular at folds."""
+    def bordered(self) -> Bordered:
+        """Directions and step by the bordered system, which is regular at folds."""
         problem, structure = self.problem, self.problem.structure
         (lanes, size), width = self.z.shape, self.problem.width
         system = structure.linear_system(self.z, self.p, problem.directions)
@@ -259,7 +253,7 @@ class Points(Columns):
             null_lanes(x, size, k, self.b, null)
         index = solution.negative - structure.constraints
         sure = ~solution.pivoted & (solution.pivot_ratio >= DOUBTFUL)
-        return self._frame(x, index, sure, system, null)
+        return x, index, sure, system, null
 
     def _over_parameters(self) -> Tangent:
         """The same where parameters are the coordinates: the structure's fused steps."""

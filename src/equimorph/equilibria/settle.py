@@ -39,6 +39,7 @@ from equimorph.equilibria.newton_step import (
     start_at,
     weights_of,
 )
+from equimorph.equilibria.onto_set import settle_onto
 from equimorph.equilibria.point_conditions import Condition
 from equimorph.model import Constraint
 from equimorph.structures import Equations, Structure, newton_kernels
@@ -205,6 +206,10 @@ def settle(
         return _apply_guards(structure, _as_settled(newton(structure, z, p, guards)), z, p, guards)
     if problem.in_one_plane and guards.known is None:
         return _apply_guards(structure, _in_one_plane(problem, z, p, guards), z, p, guards)
+    if problem.onto_set and guards.known is None:
+        told, sure = settle_onto(problem, z, p, guards)
+        settled = _as_settled(told, sure, frames=frames)
+        return _apply_guards(structure, settled, z, p, guards)
     return _apply_guards(structure, _by_steps(problem, z, p, guards, frames=frames), z, p, guards)
 
 
@@ -223,10 +228,11 @@ def _in_one_plane(problem: Problem, z: Lanes, p: Parameters, guards: Guards) -> 
     return _as_settled(found)
 
 
-def _as_settled(found: Newton) -> Settled:
-    lanes, k = found.tangents.shape[:2]
-    sure, slopes = np.ones(lanes, bool), np.zeros((lanes, 0, k))
-    told = (found.status, found.size, found.first, found.index, sure, found.tangents, slopes)
+def _as_settled(found: Newton, sure: Flags | None = None, *, frames: bool = True) -> Settled:
+    tangents = found.tangents if frames else found.tangents[:, :0]
+    lanes, k = tangents.shape[:2]
+    sure, slopes = np.ones(lanes, bool) if sure is None else sure, np.zeros((lanes, 0, k))
+    told = (found.status, found.size, found.first, found.index, sure, tangents, slopes)
     return Settled(found.z, found.p, *told, np.zeros(lanes))
 
 

@@ -156,7 +156,7 @@ def _guess(fabric: Fabric, target: Places) -> _Guess:
     store, ends, d, metric = fabric.vertices, target.ends, fabric.dimension, _metric(fabric)
     flat = np.empty((len(ends), 2, d))
     if target.mark == 0:
-        lean_edges(store.z, store.p, store.rows, metric, ends, flat)
+        lean_edges(store.place, store.rows, ends, flat)
     else:
         chord = np.subtract(*(store.place[ends[:, side]] for side in (1, 0)))
         for side in range(2):
@@ -171,8 +171,8 @@ def _guess(fabric: Fabric, target: Places) -> _Guess:
         np.empty(count),
     )
     out = found.z, found.p, found.place, found.plane, found.length
-    known = store.z, store.p, store.frame, store.rows
-    bend_edges(*known, metric, ends, target.t, held, flat, out)
+    known = store.z, store.p, store.place, store.frame, store.rows
+    bend_edges(known, metric, ends, target.t, held, flat, out)
     return found
 
 
@@ -237,7 +237,7 @@ def _are_close(fabric: Fabric, target: Places, at: Corrected | Pinned, guess: _G
     none = np.zeros((len(found), 0, 0))
     told = at.z, at.p, at.frames if isinstance(at, Corrected) else none
     edges, near = (_metric(fabric), target.ends, target.t), (guess.place, guess.length)
-    check_edges(store.z, store.p, *edges, near, (REACH, EXCESS, ALONG), told, found)
+    check_edges(store.place, *edges, near, (REACH, EXCESS, ALONG), told, found)
     return np.asarray(found)
 
 

@@ -101,7 +101,7 @@ def orient(mates, induced, signs):
     return contradictions
 
 
-@njit(nogil=True)
+@njit(nogil=True, fastmath=SUMS)
 def square_sides(place, cells, out):
     """Squared lengths of the sides 01, 02, 12 and so on of cells with corners at `place`."""
     for t in range(cells.shape[0]):
@@ -174,7 +174,30 @@ def number_edges(cells, pairs, base, ends, of_cells):
     return edge + 1
 
 
-@njit(nogil=True)
+@njit(nogil=True, forceinline=True, fastmath=SUMS)
+def lean(place, rows, a, b, chord, flat):
+    """Fill the way from a to b, and the tangent vectors (2, d) at both ends that it is nearest to.
+
+    They are as long as the way; where that is far from a tangent space they stay short.
+    """
+    width, d, squared = place.shape[1], rows.shape[1], 0.0
+    for c in range(width):
+        chord[c] = place[b, c] - place[a, c]
+        squared += chord[c] * chord[c]
+    for side in range(2):
+        at, total = b if side else a, 0.0
+        for i in range(d):
+            share = 0.0
+            for c in range(width):
+                share += rows[at, i, c] * chord[c]
+            flat[side, i] = share
+            total += share * share
+        factor = min(np.sqrt(squared) / max(np.sqrt(total), 1e-300), 2.0)
+        for i in range(d):
+            flat[side, i] *= factor
+
+
+@njit(nogil=True, fastmath=SUMS)
 def measure_edges(place, rows, ends, s_shape, out):
     """How far the cubics over edges that touch the planes at both ends are from the edges.
 
@@ -182,37 +205,25 @@ def measure_edges(place, rows, ends, s_shape, out):
     `tangents.Cubics`, which says the same of edges on which something stays zero.
     """
     width, d = place.shape[1], rows.shape[1]
-    flat = np.empty((2, d))
+    chord, flat, one, other = np.empty(width), np.empty((2, d)), np.empty(width), np.empty(width)
     for e in range(ends.shape[0]):
         a, b = ends[e, 0], ends[e, 1]
-        length = 0.0
+        lean(place, rows, a, b, chord, flat)
         for c in range(width):
-            length += (place[b, c] - place[a, c]) ** 2
-        for side in range(2):
-            total = 0.0
-            for i in range(d):
-                share = 0.0
-                for c in range(width):
-                    share += rows[ends[e, side], i, c] * (place[b, c] - place[a, c])
-                flat[side, i] = share
-                total += share * share
-            factor = min(np.sqrt(length) / max(np.sqrt(total), 1e-300), 2.0)
-            for i in range(d):
-                flat[side, i] *= factor
+            one[c] = other[c] = -chord[c]
+        for i in range(d):
+            for c in range(width):
+                one[c] += flat[0, i] * rows[a, i, c]
+                other[c] += flat[1, i] * rows[b, i, c]
         first, second, apart = 0.0, 0.0, 0.0
         for c in range(width):
-            chord = place[b, c] - place[a, c]
-            one, other = -chord, -chord
-            for i in range(d):
-                one += flat[0, i] * rows[a, i, c]
-                other += flat[1, i] * rows[b, i, c]
-            first += one * one
-            second += other * other
-            apart += (one - other) ** 2
+            first += one[c] * one[c]
+            second += other[c] * other[c]
+            apart += (one[c] - other[c]) ** 2
         out[e] = max(np.sqrt(apart) / 8.0, s_shape * np.sqrt(max(first, second)))
 
 
-@njit(nogil=True)
+@njit(nogil=True, fastmath=SUMS)
 def look_back(place, rows, cells, out):
     """Sum of the areas of triangles, twice, seen in the planes at their three corners."""
     width = place.shape[1]

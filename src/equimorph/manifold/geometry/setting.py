@@ -43,8 +43,11 @@ Coordinates = Float[np.ndarray, "lanes coordinates"]
 
 def embed(setting: Setting, z: Lanes, p: Parameters) -> Coordinates:
     """Configuration in the metric and scaled free parameters: Euclidean distances measure."""
-    u = metric_coordinates(setting.structure, z)
-    return np.concatenate([u, p[:, setting.free] / setting.scales], axis=1)
+    n = setting.structure.unknowns
+    out = np.empty((len(z), n + len(setting.free)))
+    out[:, :n] = metric_coordinates(setting.structure, z)
+    out[:, n:] = p[:, setting.free] / setting.scales
+    return out
 
 
 def principal_directions(

@@ -96,11 +96,15 @@ class Memory:
         kept = ~(touched[self.keys >> 32] & touched[self.keys & 0xFFFFFFFF])
         self.keys, self.error = self.keys[kept], self.error[kept]
 
-    def past_edges(self, fabric: Fabric) -> tuple[Pairs, Items]:
-        """Edges that were bisected, with the vertices on them, where these are there."""
-        live = np.zeros(len(fabric.vertices), bool)
+    def past_edges(self, fabric: Fabric, near: VertexFlags | None = None) -> tuple[Pairs, Items]:
+        """Edges that were bisected, with the vertices on them, where these are there.
+
+        `near`: vertices that both ends are among; else all.
+        """
+        own = slice(None) if near is None else near[self.cut[:, 0]] & near[self.cut[:, 1]]
+        cut, put, live = self.cut[own], self.put[own], np.zeros(len(fabric.vertices), bool)
         live[fabric.cells] = True
-        return self.cut[live[self.put]], self.put[live[self.put]]
+        return cut[live[put]], put[live[put]]
 
     def among(self, inside: VertexFlags) -> "Memory":
         """The part of the memory for edges between flagged vertices, with all deviations."""
@@ -192,7 +196,7 @@ def _beside_crossings(
     curve are left alone: where these meet at a small angle, cuts would go on and on.
     """
     obtuse, long = np.zeros(len(marks), bool), np.zeros(len(marks), bool)
-    if fabric.dimension != TRIANGLES:
+    if fabric.dimension != TRIANGLES or not (fabric.marks & FacetMark.CROSSING).any():
         return obtuse, long
     cell, side = np.nonzero((marks[of_cells] & FacetMark.CROSSING) > 0)
     # sides 01, 02, 12 are opposite to corners 2, 1, 0

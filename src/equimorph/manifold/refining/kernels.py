@@ -3,6 +3,7 @@
 import numpy as np
 
 from equimorph.linalg.compiled import njit
+from equimorph.linalg.kernels import SUMS
 from equimorph.linalg.row_kernels import with_room
 from equimorph.manifold.geometry.kernels import sort_sides
 
@@ -61,7 +62,7 @@ def _cotangent(squared, corner):
     return (total - 2.0 * squared[2 - corner]) / np.sqrt(max(area, 1e-28 * total**2))
 
 
-@njit(nogil=True)
+@njit(nogil=True, fastmath=SUMS)
 def _stays_up(place, rows, a, b, c, d):
     """Whether adc and dbc look the same way as abc and bad did, in the planes at all corners."""
     width = place.shape[1]
@@ -200,3 +201,31 @@ def _corner_apart(cells, t, a, b):
         if cells[t, k] != a and cells[t, k] != b:
             return k
     return 2
+
+
+@njit(nogil=True, fastmath=SUMS)
+def see_volumes(place, rows, cells, out):
+    """Areas, twice, or volumes, six times, of cells as seen from their corners: (cells, corners).
+
+    In the tangent spaces, spanned by rows (V, d, coordinates), at places (V, coordinates).
+    """
+    width, d = place.shape[1], rows.shape[1]
+    sides, flat = np.empty((d, width)), np.zeros((3, 3))
+    flat[2, 2] = 1.0
+    for t in range(cells.shape[0]):
+        for i in range(d):
+            for c in range(width):
+                sides[i, c] = place[cells[t, 1 + i], c] - place[cells[t, 0], c]
+        for corner in range(d + 1):
+            for i in range(d):
+                for k in range(d):
+                    share = 0.0
+                    for c in range(width):
+                        share += sides[i, c] * rows[cells[t, corner], k, c]
+                    flat[i, k] = share
+            total = 0.0
+            for k in range(3):
+                one, other = (k + 1) % 3, (k + 2) % 3
+                minor = flat[1, one] * flat[2, other] - flat[1, other] * flat[2, one]
+                total += flat[0, k] * minor
+            out[t, corner] = total

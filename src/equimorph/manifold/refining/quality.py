@@ -25,6 +25,7 @@ from equimorph.manifold.complex.marked_complex import (
 from equimorph.manifold.complex.vertices import Vertices
 from equimorph.manifold.geometry.simplices import squared_sides
 from equimorph.manifold.geometry.topology import count_corners, labels
+from equimorph.manifold.refining.kernels import see_volumes
 
 SHARP = np.radians(10.0)
 """Smallest angle that every cell should have at least."""
@@ -32,8 +33,6 @@ POOR = {2: np.radians(20.0), 3: np.radians(18.0)}
 """Cells with a smaller angle are made better if possible, by the dimension of the cells."""
 OVERTURNED = {2: 0.0, 3: 0.1}
 """Factor on the angle of cells that project against their index; tetrahedra at folds may do so."""
-AT_ONCE = 512
-"""Cells that are seen from their corners in one array operation."""
 
 Angles = Float[np.ndarray, " cells"]
 Indices = Int[np.ndarray, " cells"]
@@ -136,12 +135,7 @@ def project_against_index(
 def volumes_at_corners(vertices: Vertices, cells: Cells) -> Float[np.ndarray, "cells corners"]:
     """Volumes, times d!, of cells as projected onto the tangent spaces at their corners."""
     out = np.empty(cells.shape)
-    for first in range(0, len(cells), AT_ONCE):
-        own = cells[first : first + AT_ONCE]
-        sides = vertices.place[own[:, 1:]] - vertices.place[own[:, :1]]
-        for corner in range(cells.shape[1]):
-            flat = sides @ np.swapaxes(vertices.rows[own[:, corner]], 1, 2)
-            out[first : first + AT_ONCE, corner] = determinants(flat)
+    see_volumes(vertices.place, vertices.rows, np.ascontiguousarray(cells), out)
     return out
 
 

@@ -174,8 +174,9 @@ def _admissible(refills: Refills, memory: Memory, limit: float) -> Bool[np.ndarr
     """Whether no edge comes that was bisected, while its vertex stays, or deviates too much."""
     fabric, base = refills.fabric, len(refills.fabric.vertices)
     row, key = refills.new_edges
-    good = np.ones(refills.count, bool)
-    cut, on_edge = memory.past_edges(fabric)
+    good, near = np.ones(refills.count, bool), np.zeros(base, bool)
+    near[rows_of(key, base, 2)] = True
+    cut, on_edge = memory.past_edges(fabric, near)
     order = np.argsort(keys_of(cut, base))
     known, on_edge = keys_of(cut, base)[order], on_edge[order]
     back = np.flatnonzero(among(key, known))
