@@ -32,9 +32,7 @@ from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.setting import Setting
 from equimorph.manifold.geometry.simplices import squared_sides
 from equimorph.manifold.geometry.tangents import Ends
-from equimorph.manifold.geometry.topology import (
-    keys_of,
-)
+from equimorph.manifold.geometry.topology import count_corners, keys_of
 from equimorph.structures import States
 
 
@@ -163,7 +161,11 @@ class Fabric:
         return np.asarray(total <= 0.0)
 
     def bisect(self, edges: Int[np.ndarray, "E 2"], more: Vertices) -> "Fabric":
-        """Cut edges at new vertices, and all cells and facets around them.
+        """Cut edges at new vertices, and all cells and facets around them."""
+        return self.cut(edges, self.vertices.join(more))
+
+    def cut(self, edges: Int[np.ndarray, "E 2"], vertices: Vertices) -> "Fabric":
+        """Cut edges, and all cells and facets around them, at vertices behind those there are.
 
         Cells with several of the edges are cut at the first of them first, so that neighbours agree
         on what they share.
@@ -171,9 +173,9 @@ class Fabric:
         base = len(self.vertices)
         cells, of_cells = _bisect(self.cells, edges, base)
         facets, of_facets = _bisect(self.facets, edges, base)
-        vertices = self.vertices.join(more)
         squared = self.squared[of_cells]
-        changed = np.flatnonzero((cells >= base).any(axis=1))
+        came = np.arange(len(vertices)) >= base
+        changed = np.flatnonzero(count_corners(came, cells))
         squared[changed] = squared_sides(vertices.place, cells[changed])
         return replace(
             self,

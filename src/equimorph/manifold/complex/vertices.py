@@ -1,6 +1,6 @@
 """Vertices of a complex that is being cut and rearranged: exact points with tangent frames."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -61,18 +61,20 @@ class Vertices(Columns):
         """All that is known of each vertex."""
         return {name: column for name, column in vars(self).items() if name != "room"}
 
-    def join(self, *more: "Vertices") -> "Vertices":
-        """Return these vertices and more.
+    def join(self, *more: "Vertices", place: VertexNumbers | None = None) -> "Vertices":
+        """Return these vertices and more: part by part, or each in its place behind these.
 
         Copied only if there is no room behind them, so that many additions cost as much as few.
         """
-        room, count = self.room, len(self) + sum(map(len, more))
+        room, sizes = self.room, [len(part) for part in more]
+        count = len(self) + sum(sizes)
         if room is None or not self._before(room) or count > len(room.arrays["z"]):
             room = self._roomy(ROOM * count)
-        for each in more:
+        behind = np.arange(count - len(self)) if place is None else place
+        for each, own in zip(more, np.split(behind, np.cumsum(sizes)[:-1]), strict=bool(more)):
             for name, column in each.columns.items():
-                room.arrays[name][room.used : room.used + len(each)] = column
-            room.used += len(each)
+                room.arrays[name][len(self) + own] = column
+        room.used = count
         return replace(self, **{k: array[:count] for k, array in room.arrays.items()}, room=room)
 
     def _before(self, room: _Room) -> bool:
@@ -87,17 +89,6 @@ class Vertices(Columns):
             arrays[name] = np.empty((capacity, *column.shape[1:]), column.dtype)
             arrays[name][: len(self)] = column
         return _Room(arrays, len(self))
-
-
-def gather(parts: Sequence[Vertices], place: VertexNumbers) -> Vertices:
-    """Vertices of several parts, part by part, each in its place."""
-    first, cuts = parts[0], np.cumsum([len(part) for part in parts])[:-1]
-    columns = {}
-    for name, column in first.columns.items():
-        columns[name] = np.empty((len(place), *column.shape[1:]), column.dtype)
-        for part, own in zip(parts, np.split(place, cuts), strict=True):
-            columns[name][own] = part.columns[name]
-    return replace(first, **columns, room=None)
 
 
 def vertices_of(

@@ -16,7 +16,7 @@ from equimorph.equilibria.trace_options import TraceOptions
 from equimorph.manifold.complex.cuts import copies, duplicates, first_copies, with_copies
 from equimorph.manifold.complex.edge_points import Places, chunks, on_all_edges, unmet
 from equimorph.manifold.complex.marked_complex import CURVES, Fabric, FacetMark
-from equimorph.manifold.complex.vertices import Vertices, gather, vertices_of
+from equimorph.manifold.complex.vertices import Vertices, vertices_of
 from equimorph.manifold.geometry.points import CAP, CROSSING, FOLD
 from equimorph.manifold.geometry.topology import keys_of
 from equimorph.manifold.refining.deviation import Edges, Memory, choose_edges, update_edges
@@ -115,13 +115,18 @@ def bisect(fabric: Fabric, edges: Edges, at_once: Items, memory: Memory) -> Fabr
     order = np.argsort(rank[at])
     place = np.empty(len(at), int)
     place[order] = np.arange(len(at))
-    at, more = at[order], gather(parts, place)
+    at, base = at[order], len(fabric.vertices)
+    vertices = fabric.vertices.join(*parts, place=place)
+    found = vertices.take(slice(base, None))
     if ((edges.marks[at] & CURVES) > 0).any():
         memory.stuck.clear()  # near a fold that is better resolved they may succeed
-    whole, more = with_copies(fabric, ends[at], more)
+    whole, more = with_copies(fabric, ends[at], found)
     memory.cut = np.concatenate([memory.cut, whole])
-    memory.put = np.concatenate([memory.put, len(fabric.vertices) + np.arange(len(whole))])
-    return fabric.bisect(whole, more) if len(at) else fabric
+    memory.put = np.concatenate([memory.put, base + np.arange(len(whole))])
+    if more is not found:
+        vertices = vertices.join(more.take(slice(len(found), None)))
+        vertices.shared[base:] = more.shared  # in the room behind the vertices that there were
+    return fabric.cut(whole, vertices) if len(at) else fabric
 
 
 def _vertices_on(

@@ -19,7 +19,7 @@ from equimorph.manifold.complex.marked_complex import (
 )
 from equimorph.manifold.geometry.kernels import measure_edges
 from equimorph.manifold.geometry.tangents import S_SHAPE, Cubics
-from equimorph.manifold.geometry.topology import keys_of
+from equimorph.manifold.geometry.topology import count_corners, keys_of
 
 PREFERENCE = 1.6
 """How much longer an edge must be than those that deviate to be bisected before them."""
@@ -245,8 +245,7 @@ def choose_edges(edges: Edges, tolerance: float) -> Items:
     few = np.count_nonzero(deviating) * FEW < len(deviating) and not deviating[edges.uneven].any()
     coarse, _ = _close(edges, deviating & (few | (edges.error > COARSE * tolerance)))
     wanted, weight = _close(edges, coarse | deviating)
-    cells = edges.of_cells[wanted[edges.of_cells].any(axis=1)]
-    longest = cells[np.arange(len(cells)), weight[cells].argmax(axis=1)]
+    longest = _first_cuts(edges, wanted, weight)
     around = np.bincount(edges.of_cells.ravel(), minlength=len(weight))
     agreed = np.bincount(longest, minlength=len(weight)) == around
     out = np.flatnonzero(coarse | (agreed & wanted))
@@ -263,10 +262,21 @@ def _close(edges: Edges, wanted: EdgeFlags) -> tuple[EdgeFlags, Float[np.ndarray
     weight = np.where(wanted, PREFERENCE, 1.0) * edges.length
     weight[edges.stuck] = -1.0
     while True:
-        cells = edges.of_cells[wanted[edges.of_cells].any(axis=1)]
-        longest = cells[np.arange(len(cells)), weight[cells].argmax(axis=1)]
+        longest = _first_cuts(edges, wanted, weight)
         more = longest[~wanted[longest]]
         if len(more) == 0:
             return wanted, weight
         wanted[more] = True
         weight[more] = PREFERENCE * edges.length[more]
+
+
+def _first_cuts(
+    edges: Edges, wanted: EdgeFlags, weight: Float[np.ndarray, " E"]
+) -> Int[np.ndarray, " cells"]:
+    """Edge that each cell with a chosen edge prefers to be cut at, side by side of the cells."""
+    cells = edges.of_cells[count_corners(wanted, edges.of_cells) > 0]
+    first, most = cells[:, 0], weight[cells[:, 0]]
+    for side in cells.T[1:]:
+        own = weight[side]
+        first, most = np.where(own > most, side, first), np.maximum(own, most)
+    return np.asarray(first)

@@ -20,7 +20,8 @@ from equimorph.manifold.complex.marked_complex import (
     edges_of,
     held_parameters,
 )
-from equimorph.manifold.complex.vertices import Vertices
+from equimorph.manifold.complex.vertices import Vertices, free_vertices
+from equimorph.manifold.geometry.exact_points import Corrected, Pinned, correct_between
 from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.geometry.simplices import squared_sides
 from equimorph.manifold.geometry.tangents import split_step
@@ -235,12 +236,19 @@ def _at_better_places(
     for k in held_parameters(mark, fabric.dimension):
         p[:, setting.free[k]] = store.p[chosen, setting.free[k]]
     planes, length = store.rows[chosen], np.linalg.norm(step, axis=1)
-    pinned = on_curves(fabric, mark, z, p, embed(setting, z, p), planes, length, end)
-    free = pinned.p[:, setting.free]
-    found = pinned.found & ((free >= fabric.box[0]) & (free <= fabric.box[1])).all(axis=1)
-    found = of_index(fabric, mark, pinned, found, store.index[chosen])
+    near, index = (z, p, embed(setting, z, p), planes, length), store.index[chosen]
+    at: Corrected | Pinned
+    at = on_curves(fabric, mark, *near, end) if mark else correct_between(setting, *near)
+    free = at.p[:, setting.free]
+    found = at.found & ((free >= fabric.box[0]) & (free <= fabric.box[1])).all(axis=1)
+    if isinstance(at, Corrected):
+        found &= at.index == index
+    else:
+        found = of_index(fabric, mark, at, found, index)
     none[np.flatnonzero(far)[found]] = True
-    return none, vertices_at(fabric, mark, pinned, found, store.index[chosen], planes)
+    if isinstance(at, Corrected):
+        return none, free_vertices(setting, at.take(found))
+    return none, vertices_at(fabric, mark, at, found, index, planes)
 
 
 @dataclass(frozen=True)
