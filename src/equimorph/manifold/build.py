@@ -395,8 +395,5 @@ def _longest_edges(pairing: Pairing, cells: Cells) -> Items:
     """Longest edge of each doubtful grid cell, relative to the box."""
     mesh = pairing.mesh
     around = mesh.faces[cells.doubtful_tetrahedra]
-    groups = [
-        mesh.sides[cells.doubtful_triangles],
-        mesh.sides[around].reshape(len(around), 12),
-    ]
+    groups = mesh.sides[cells.doubtful_triangles], mesh.sides[around].reshape(len(around), 12)
     return np.unique(np.concatenate([longest_edges(mesh, sides) for sides in groups]))

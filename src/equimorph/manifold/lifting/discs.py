@@ -19,7 +19,7 @@ from equimorph.manifold.lifting.crossing_discs import (
     split_crossings,
 )
 from equimorph.manifold.lifting.fold_walks import fold_exits, nearest_at
-from equimorph.manifold.lifting.fold_ways import followed_ways
+from equimorph.manifold.lifting.fold_ways import followed_ways, ways_to_join
 from equimorph.manifold.lifting.loops import Loops
 from equimorph.manifold.lifting.pairing import Pairing
 from equimorph.manifold.lifting.patterns import cut_by_pattern
@@ -33,8 +33,6 @@ from equimorph.manifold.lifting.polygon_cuts import (
     chord_of,
     chords_to_split,
     cut,
-    match_around_hub,
-    match_folds,
     planes,
     triangulate,
 )
@@ -219,17 +217,9 @@ def _through(plan: Plan) -> int:
     return VertexKind.CAP if _same_side(plan, (plan.points[0], plan.points[-1])) else 0
 
 
-def _ways(pairing: Pairing, plan: Plan) -> list[list[Chord]]:
-    """Ways to join the folds of a polygon, around a hub if there are no others."""
-    index = pairing.points.index.__getitem__
-    ways = match_folds(plan.points, plan.singular, index)
-    crossed = not ways and plan.those(MEETING) and plan.those(TURN)
-    return match_around_hub(plan.points, plan.singular, index) if crossed else ways
-
-
 def _join_folds(pairing: Pairing, plans: list[Plan], found: _Found) -> list[Plan]:
     """Decide which folds of each polygon belong together; return plans where that is certain."""
-    ways = [_ways(pairing, plan) for plan in plans]
+    ways = [ways_to_join(pairing, plan) for plan in plans]
     several = [k for k, each in enumerate(ways) if len(each) > 1]
     followed = followed_ways(pairing, [plans[k] for k in several], [ways[k] for k in several])
     for k, each in zip(several, followed, strict=True):

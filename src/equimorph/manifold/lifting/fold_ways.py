@@ -9,7 +9,22 @@ from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.lifting.crossing_discs import Ways
 from equimorph.manifold.lifting.fold_walks import fold_exits, nearest_at
 from equimorph.manifold.lifting.pairing import Pairing
-from equimorph.manifold.lifting.polygon_cuts import TURN, Plan, chord_of
+from equimorph.manifold.lifting.polygon_cuts import (
+    MEETING,
+    TURN,
+    Plan,
+    chord_of,
+    match_around_hub,
+    match_folds,
+)
+
+
+def ways_to_join(pairing: Pairing, plan: Plan) -> Ways:
+    """Ways to join the folds of a polygon, around a hub if there are no others."""
+    index = pairing.points.index.__getitem__
+    ways = match_folds(plan.points, plan.singular, index)
+    crossed = not ways and plan.those(MEETING) and plan.those(TURN)
+    return match_around_hub(plan.points, plan.singular, index) if crossed else ways
 
 
 def followed_ways(pairing: Pairing, plans: list[Plan], choices: list[Ways]) -> list[Ways]:

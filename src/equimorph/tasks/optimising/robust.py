@@ -384,9 +384,8 @@ def _at_edge(question: _Question, number: int) -> Descriptor:
 def _edge(programme: Programme, ray: Ray, number: int, end: CriticalPoint) -> _End:
     state = State(programme.setting.structure, end.point.z[0], end.point.p[0])
     found = certificate(programme, end)
-    outward, inward = (
-        found.active.get(str(rule), 0.0) for rule in (ray.room >= 1.0, ray.room <= 1.0)
-    )
+    rules = ray.room >= 1.0, ray.room <= 1.0
+    outward, inward = (found.active.get(str(rule), 0.0) for rule in rules)
     held = outward > inward + BEYOND * max(found.active.values(), default=0.0)
     return _End(state, float(end.expansion.f.max()), ray.offsets, found, not held, number)
 
