@@ -23,7 +23,6 @@ from equimorph.marching.kernels import ARRIVAL, CONVERGED, ENDED, RETURN, STARTI
 from equimorph.model import Constraint
 from equimorph.structures import Advance
 from equimorph.structures.contract import CompiledSteps
-from equimorph.tolerances import METRIC_DIFFERENCE
 
 AT_GOAL, FROM_GOAL = 1e-9, 1e-6
 """Distance from an end of t, and of the states in the metric, from which Newton's method takes
@@ -215,11 +214,11 @@ class Block:
             return 0
         doubt = np.flatnonzero(rows.grazing[:, : rows.active].any(axis=0))
         for row, end in enumerate((rows.front(doubt), rows.ahead(doubt, move)), violations.RISE):
-            dz, dt = METRIC_DIFFERENCE * end.tangent_z, METRIC_DIFFERENCE * end.tangent_t
+            dz, dt = violations.BOTH_WAYS * end.tangent_z, violations.BOTH_WAYS * end.tangent_t
             ahead, behind = (
                 self._excess(doubt, end.z + s * dz, end.t + s * dt) for s in (1.0, -1.0)
             )
-            slopes = (ahead - behind) / (2.0 * METRIC_DIFFERENCE)
+            slopes = (ahead - behind) / (2.0 * violations.BOTH_WAYS)
             rows.values[row :: violations.VALUES, doubt] = slopes
         return int(violations.weigh(*given))
 

@@ -29,7 +29,6 @@ from equimorph.marching.kernels import (
     X_2,
     T,
 )
-from equimorph.tolerances import METRIC_DIFFERENCE
 
 EARLIER, LAST, HERE, NEW, RISE, NEW_RISE = range(6)
 """Rows of the values of each constraint: two steps before, one, here, and at the end of the step;
@@ -40,6 +39,8 @@ WARY, WARY_FIRST = 16.0, 2.0
 first: of 4 285 short violations none was beyond, and 4 % of ordinary steps are not."""
 SURE = 4.0
 """Factor of the error of a cubic at places behind it; 2.5 did for 4 284 of the 4 285."""
+BOTH_WAYS = 1e-5
+"""Length of the differences, to both sides, that are slopes of constraints."""
 TOUCH = 1e-9
 """Excess that is none, as on bounds of size 1 or less."""
 
@@ -88,7 +89,7 @@ def _may_exceed(i, values, numbers, counts):
 def beside(side, places, new_tangent, numbers, counts, active, grazing, z, at):
     """Points beside starts (sides 0, 1) or ends (2, 3) of steps in doubt; how many."""
     points, tangent, trial, _ = places
-    h, count = METRIC_DIFFERENCE if side % 2 else -METRIC_DIFFERENCE, 0
+    h, count = BOTH_WAYS if side % 2 else -BOTH_WAYS, 0
     for i in range(active):
         doubt = False
         for k in range(grazing.shape[0]):
@@ -117,7 +118,7 @@ def note_slopes(side, found, count, at, values):
         row = VALUES * k + RISE + side // 2
         for i in range(count):
             if side % 2:
-                values[row, at[i]] = (found[k, i] - values[row, at[i]]) / (2.0 * METRIC_DIFFERENCE)
+                values[row, at[i]] = (found[k, i] - values[row, at[i]]) / (2.0 * BOTH_WAYS)
             else:
                 values[row, at[i]] = found[k, i]
 
