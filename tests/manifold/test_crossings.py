@@ -192,16 +192,19 @@ def test_hilltops_are_found_where_another_eigenvalue_is_small_all_around(soft, g
 def test_hilltops_are_found_beside_folds_that_leave_their_pitchforks(box, c):
     """Both lie on one chord: the cubic coefficient of the crossing changes its sign in each.
 
-    It is the same at both ends, one of which was taken for the hilltop (wrong cells; set 904 of the
-    soak with a bound on rotations). Both may be one point if they are nearer than 1e-3 of a chord.
+    Each is a hub of its own sheet: 9 to 23 triangles were bisected until they were parted. One of
+    the ends was taken for the hilltop before (wrong cells; set 904 of the soak with a bound on
+    rotations). Both may be one point if they are nearer than 1e-3 of a chord.
     """
     eset = lifted(hilltop_beside_tricritical(c), box, checks=2, intervals=(3, 3))
     assert_faithful(eset)
     assert_crossings(eset)
+    assert eset.audit.bisected <= 2
     hubs = np.intersect1d(np.concatenate(eset.folds), np.concatenate(eset.crossings))
-    exact = np.array([[0.0, 0.0], [-(c**3) / 4, c**4 / 16]])
-    off = np.linalg.norm(eset.coordinates[hubs] - exact[:, None], axis=2).min(axis=1)
-    np.testing.assert_array_less(off, [1e-6, 1e-3])
+    exact = np.array([[0.0, 0.0], [-(c**3) / 4, c**4 / 16]])[: len(hubs)]
+    assert len(hubs) == 2 or c < 0.1
+    off = np.linalg.norm(eset.coordinates[hubs] - exact[:, None], axis=2)
+    np.testing.assert_allclose(off.min(axis=1), 0.0, atol=1e-6)
 
 
 @pytest.mark.parametrize("grid", [(2, 2), (3, 3)])

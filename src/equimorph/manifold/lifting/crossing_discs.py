@@ -1,10 +1,12 @@
 """Polygons of two sheets that cross over one grid triangle share the chords of their crossing.
 
 Each crossing point lies on two polygons. Where a fold of one of the sheets crosses that chord, too,
-all meet in a hub: an exact crossing point at which a test function of the fold vanishes.
+all meet in a hub: an exact crossing point at which a test function of the fold vanishes. Folds of
+both sheets have one hub each, which may be the same.
 """
 
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 from itertools import product
 from typing import NamedTuple
 
@@ -14,15 +16,25 @@ from scipy.optimize import brentq
 from equimorph.arrays import Float, ItemValues
 from equimorph.equilibria.critical import Critical, null_border
 from equimorph.equilibria.settle import lower_index
-from equimorph.manifold.geometry.exact_points import Aim, Pinned, correct_points, pin_crossings
+from equimorph.manifold.geometry.exact_points import Aim, correct_points, pin_crossings
 from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.lifting.pairing import Pairing
-from equimorph.manifold.lifting.polygon_cuts import MEETING, Chord, Plan, crossed_chords, planes
+from equimorph.manifold.lifting.polygon_cuts import (
+    MEETING,
+    Chord,
+    Plan,
+    chord_of,
+    crossed_chords,
+    planes,
+)
+from equimorph.structures import Structure
 from equimorph.structures.margin import count_below
 from equimorph.structures.metric import metric_length
 
 Ways = list[list[Chord]]
+State = tuple[np.ndarray, np.ndarray]
+"""Unknowns with multipliers, and parameters."""
 
 COMBINATIONS = 256
 """Ways to cut all polygons over a triangle beyond which it is undecided at once."""
@@ -89,16 +101,30 @@ def put_hubs(pairing: Pairing, plans: list[Plan]) -> set[int]:
         if crossed is None:
             continue
         (chord, fold), triangle = crossed, hub.polygon.triangle
-        point = _hub(pairing, triangle, chord)
-        if point is None:
+        points = _hubs(pairing, triangle, chord)
+        if points is None:
             lost.add(triangle)
             continue
         for plan in plans:
             if plan.polygon.triangle == triangle and chord in plan.chords:
-                plan.middle[chord] = point
+                plan.middle.update(_between(pairing, chord))
+        point = points[0 if _is_parted(pairing, hub, chord) else -1]
         others = [each for each in hub.chords if each not in crossed]
         hub.chords = [chord, *((end, point) for end in fold), *others]
     return lost
+
+
+def _is_parted(pairing: Pairing, plan: Plan, chord: Chord) -> bool:
+    """Whether the index of a sheet changes across the crossing, which ends at a chord's end."""
+    at, index = plan.points.index(chord[0]), pairing.points.index
+    return bool(index[plan.points[at - 1]] != index[plan.points[(at + 1) % len(plan.points)]])
+
+
+def _between(pairing: Pairing, chord: Chord) -> dict[Chord, int]:
+    """Hubs on a chord: the first between its ends, another between the first and an end."""
+    hub = pairing.hubs[chord]
+    pairs = [chord, *(chord_of(end, hub) for end in chord)]
+    return {pair: pairing.hubs[pair] for pair in pairs if pair in pairing.hubs}
 
 
 def split_crossings(pairing: Pairing, plans: list[Plan], chords: set[Group]) -> list[int]:
@@ -144,62 +170,102 @@ def _pin(pairing: Pairing, groups: Sequence[Group], *, cap: bool) -> list[int | 
     ]
 
 
-def _hub(pairing: Pairing, triangle: int, chord: Chord) -> int | None:
-    """Crossing between two crossings at which a fold of a sheet crosses, too.
+def _hubs(pairing: Pairing, triangle: int, chord: Chord) -> tuple[int, ...] | None:
+    """Crossings between two crossings at which folds of their sheets cross, too: one or two.
 
     There the quadratic coefficient of the reduced equation changes its sign; at pitchforks, where
-    it is zero all along, the cubic one does. If another eigenvalue vanishes, the index does; the
-    cubic coefficient has a pole there. It may have a zero beside it, where a fold of the side
-    branch ends: that is the same point if it is as near as hubs are precise.
+    it is zero all along, the cubic one does. If another eigenvalue vanishes, the index does, and a
+    fold of the sheet whose index changes across the crossing passes; the cubic coefficient has a
+    pole there. It may have a zero beside it, where a fold of the side branch passes: the second
+    hub, or the same one if it is as near as hubs are precise.
     """
-    if chord in pairing.hubs:
-        return pairing.hubs[chord]
-    setting, store, ends = pairing.setting, pairing.points, list(chord)
-    z, p = store.z[ends], store.p[ends]
-    place = embed(setting, z, p)
-    way = place[1] - place[0]
-    length = float(np.linalg.norm(way))
-    span, rows = planes(pairing, [triangle]), (way / length)[None, None]
-    sense = null_border(setting.structure, z[:1], p[:1])[0]
-    quadratic, cubic = _coefficients(pairing, z, p, sense)
-    low, high = count_below(setting.structure, z, p, -VANISHING).tolist()
-    skew = (np.abs(quadratic) > SKEW * np.abs(cubic)).any()
-    found: list[Pinned] = []
-    known = {0.0: (z[0], p[0]), 1.0: (z[1], p[1])}
+    if chord not in pairing.hubs:
+        try:
+            hubs, end = _sought(_Crossing(pairing, triangle, chord))
+        except (_NoCrossingError, ValueError):
+            return None
+        store, pair = pairing.points, chord
+        index = int(store.index[list(chord)].min())
+        for z, p in hubs:
+            point = pairing.hubs[pair] = store.add(z, p, index, VertexKind.CROSSING)
+            pair = chord_of(chord[end], point)
+    return tuple(_between(pairing, chord).values())
 
-    def test(share: float) -> float:
-        middle = (place[0] + share * way)[None]
-        aim = Aim(setting, False, False, span, middle, rows, crossing=True, border=sense[None])
-        pinned = correct_points(aim, *_guess(known, share), np.array([length]))
+
+class _Crossing:
+    """Where two sheets cross near a chord, by the share of the chord."""
+
+    def __init__(self, pairing: Pairing, triangle: int, chord: Chord) -> None:
+        setting, ends = pairing.setting, list(chord)
+        self._structure = setting.structure
+        z, p = pairing.points.z[ends], pairing.points.p[ends]
+        self._place = embed(setting, z, p)
+        self._way = self._place[1] - self._place[0]
+        self._length = float(np.linalg.norm(self._way))
+        self._sense = null_border(self._structure, z[:1], p[:1])[0]
+        span, rows = planes(pairing, [triangle]), (self._way / self._length)[None, None]
+        self._aim = Aim(
+            setting, False, False, span, self._place[:1], rows, crossing=True,
+            border=self._sense[None],
+        )  # fmt: skip
+        self._known = {0.0: (z[0], p[0]), 1.0: (z[1], p[1])}
+        self.last = z[0], p[0]
+        """State and parameters of the point that was computed last."""
+
+    def _go(self, share: float) -> None:
+        if share in self._known:
+            self.last = self._known[share]
+            return
+        middle = (self._place[0] + share * self._way)[None]
+        guess, length = _guess(self._known, share), np.array([self._length])
+        pinned = correct_points(replace(self._aim, middle=middle), *guess, length)
         if not pinned.found[0]:
             raise _NoCrossingError
-        found.append(pinned)
-        known[share] = pinned.z[0], pinned.p[0]
-        if low != high:
-            return float(count_below(setting.structure, pinned.z, pinned.p, -VANISHING)[0] - low)
-        return float(_coefficients(pairing, pinned.z, pinned.p, sense)[1 - skew][0])
+        self.last = self._known[share] = pinned.z[0], pinned.p[0]
 
-    def cubic_at(share: float) -> float:
-        test(min(max(share, 0.0), 1.0))
-        return float(_coefficients(pairing, found[-1].z, found[-1].p, sense)[1][0])
+    def index(self, share: float) -> int:
+        """Number of other eigenvalues below zero."""
+        self._go(share)
+        z, p = self.last
+        return int(count_below(self._structure, z[None], p[None], -VANISHING)[0])
 
-    try:
-        if low == high:
-            test(brentq(test, 0.0, 1.0, xtol=HUB))
-            hub = found[-1]
-        else:
-            share = _halve(test)
-            hub = found[-1]
-            _refuse_two(cubic, (cubic_at(share - FAR), cubic_at(share + FAR)))
-    except (_NoCrossingError, ValueError):
-        return None
-    index = int(store.index[ends].min())
-    pairing.hubs[chord] = store.add(hub.z[0], hub.p[0], index, VertexKind.CROSSING)
-    return pairing.hubs[chord]
+    def coefficients(self, share: float) -> tuple[float, float]:
+        """Quadratic and cubic coefficient of the reduced equation."""
+        self._go(share)
+        z, p = self.last
+        quadratic, cubic = _coefficients(self._structure, z[None], p[None], self._sense)
+        return float(quadratic[0]), float(cubic[0])
+
+    def quadratic(self, share: float) -> float:
+        """Quadratic coefficient."""
+        return self.coefficients(share)[0]
+
+    def cubic(self, share: float) -> float:
+        """Cubic coefficient."""
+        return self.coefficients(share)[1]
+
+
+def _sought(crossing: _Crossing) -> tuple[list[State], int]:
+    """Hubs on a crossing, and the end of its chord between which and the first the second lies."""
+    ends = crossing.coefficients(0.0), crossing.coefficients(1.0)
+    low, high = crossing.index(0.0), crossing.index(1.0)
+    if low == high:
+        skew = any(abs(quadratic) > SKEW * abs(cubic) for quadratic, cubic in ends)
+        test = crossing.quadratic if skew else crossing.cubic
+        test(brentq(test, 0.0, 1.0, xtol=HUB))
+        return [crossing.last], 0
+    share = _halve(lambda share: crossing.index(share) == low)
+    hub, (before, behind) = crossing.last, (share - FAR, share + FAR)
+    start, end = (crossing.cubic(min(max(each, 0.0), 1.0)) for each in (before, behind))
+    if not ends[0][1] * ends[1][1] > 0.0 > start * end:
+        return [hub], 0
+    side = 0 if ends[0][1] * start < 0.0 else 1
+    crossing.cubic(brentq(crossing.cubic, *((0.0, before), (behind, 1.0))[side], xtol=HUB))
+    return [hub, crossing.last], side
 
 
 def _guess(
-    known: dict[float, tuple[np.ndarray, np.ndarray]], share: float
+    known: dict[float, State], share: float
 ) -> tuple[Float[np.ndarray, "1 size"], Float[np.ndarray, "1 P"]]:
     """State and parameters between the nearest known points on both sides.
 
@@ -214,36 +280,27 @@ def _guess(
     return z, p
 
 
-def _halve(test: Callable[[float], float]) -> float:
-    """Go near where a test begins to differ from zero, at which it may fail: a hub; its share."""
+def _halve(is_before: Callable[[float], bool]) -> float:
+    """Go near a hub, at which a test changes that may fail beside it; the hub's share."""
     low, high = 0.0, 1.0
     while high - low > NEAR:
         middle = 0.5 * (low + high)
         try:
-            same = test(middle) == 0.0
+            before = is_before(middle)
         except _NoCrossingError:
             if high - low > FAR:
                 raise
             break
-        low, high = (middle, high) if same else (low, middle)
+        low, high = (middle, high) if before else (low, middle)
     return 0.5 * (low + high)
 
 
-def _refuse_two(ends: ItemValues, around: tuple[float, float]) -> None:
-    """Refuse a hub with a zero of the cubic coefficient on the chord, but not near it.
-
-    `ends`, `around`: the coefficient at both ends, and on both sides of the hub.
-    """
-    if ends[0] * ends[1] > 0.0 > around[0] * around[1]:
-        raise _NoCrossingError
-
-
 class _NoCrossingError(Exception):
-    """Raised where the search for a hub leaves the crossing, or meets more than a hub."""
+    """Raised where the search for a hub leaves the crossing."""
 
 
 def _coefficients(
-    pairing: Pairing,
+    structure: Structure,
     z: Float[np.ndarray, "n size"],
     p: Float[np.ndarray, "n P"],
     sense: Float[np.ndarray, " size"],
@@ -252,7 +309,6 @@ def _coefficients(
 
     Near a hub another one is as good a null vector.
     """
-    structure = pairing.setting.structure
     v = Critical(structure, z, p, np.tile(sense, (len(z), 1))).v
     norm = metric_length(structure, v) / (v**2).sum(axis=1)
     at = Critical(structure, z, p, np.ascontiguousarray(v * norm[:, None]))

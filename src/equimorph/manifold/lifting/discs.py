@@ -1,6 +1,7 @@
 """Sheet lifting, the discs: polygons become triangulated discs that fit together."""
 
 from dataclasses import dataclass, field
+from itertools import pairwise, starmap
 
 import numpy as np
 
@@ -30,6 +31,7 @@ from equimorph.manifold.lifting.polygon_cuts import (
     Chord,
     Piece,
     Plan,
+    between,
     chord_of,
     chords_to_split,
     cut,
@@ -301,7 +303,7 @@ def _follow_lost(pairing: Pairing, groups: list[Group], points: list[int | None]
 def _chords_to_split(plan: Plan) -> list[Chord]:
     """Chords that need a further point; see `chords_to_split`."""
     place = {point: at for at, point in enumerate(plan.points)}
-    chords = {(place[a], place[b]): (a, b) for a, b in plan.chords if {a, b} <= set(place)}
+    chords = {chord_of(place[a], place[b]): (a, b) for a, b in plan.chords if {a, b} <= set(place)}
     chosen = chords_to_split(tuple(plan.on(plan.points)), tuple(chords))
     return [chords[chord] for chord in chosen]
 
@@ -359,10 +361,8 @@ def _fill(pairing: Pairing, plans: list[Plan], found: _Found) -> None:
         plan.sheet = number
         for chord in plan.chords:
             marked = found.crossings if plan.singular(chord[0]) == MEETING else found.folds
-            if chord in plan.middle:
-                marked.update(chord_of(end, plan.middle[chord]) for end in chord)
-            else:
-                marked.add(chord_of(*chord))
+            way = (chord[0], *between(chord, plan.middle), chord[1])
+            marked.update(starmap(chord_of, pairwise(way)))
         for piece in cut(plan.points, plan.chords, plan.middle):
             index = _index(pairing, piece)
             if index is None or len(piece) < 3:

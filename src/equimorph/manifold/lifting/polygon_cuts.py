@@ -129,17 +129,29 @@ def crossed_chords(plan: "Plan") -> tuple[Chord, Chord] | None:
     return None
 
 
+def between(chord: Chord, middle: dict[Chord, int]) -> tuple[int, ...]:
+    """Extra points on a chord, from its first end to its second.
+
+    `middle` holds one for some pairs of points, which may be an end and another extra point.
+    """
+    point = middle.get(chord_of(*chord))
+    if point is None:
+        return ()
+    before, behind = between((chord[0], point), middle), between((point, chord[1]), middle)
+    return *before, point, *behind
+
+
 def cut(polygon: Sequence[int], chords: Sequence[Chord], middle: dict[Chord, int]) -> list[Piece]:
-    """Pieces of a polygon between chords; `middle` holds extra points on some chords."""
+    """Pieces of a polygon between chords, with the points `between` their ends."""
     pieces = [tuple(polygon)]
     for chord in chords:
         for number, piece in enumerate(pieces):
             if chord[0] in piece and chord[1] in piece:
                 i, j = sorted((piece.index(chord[0]), piece.index(chord[1])))
-                extra = (middle[chord],) if chord in middle else ()
+                extra = between((piece[i], piece[j]), middle)
                 inside, outside = piece[i : j + 1], (*piece[j:], *piece[: i + 1])
                 # from the end of each part back to its beginning runs the chord
-                pieces[number] = (*inside, *extra)
+                pieces[number] = (*inside, *extra[::-1])
                 pieces.append((*outside, *extra))
                 break
     return pieces
@@ -276,11 +288,11 @@ class Plan:
         self.kinds[point] = kind
 
     def on(self, points: Sequence[int]) -> list[int]:
-        """Sides on which points lie; the ends of a chord with a point on it count as on one."""
+        """Sides on which points lie; all points of a chord with others on it count as on one."""
         sides = dict(self.sides)
-        for k, chord in enumerate(self.middle):
-            for end in chord:
-                sides[end] = sides.get(end, 0) | 8 << k
+        for k, chord in enumerate(each for each in self.chords if each in self.middle):
+            for point in (*chord, *between(chord, self.middle)):
+                sides[point] = sides.get(point, 0) | 8 << k
         return [sides.get(point, 0) for point in points]
 
 

@@ -22,6 +22,7 @@ from equimorph.manifold.lifting.cells import volumes_over
 from equimorph.manifold.lifting.discs import Discs, assemble
 from equimorph.manifold.lifting.loops import find_loops
 from equimorph.manifold.lifting.pairing import Pairing, RayMark
+from equimorph.manifold.lifting.polygon_cuts import chord_of
 from equimorph.manifold.lifting.tile_floods import (
     Flooded,
     FloodGlue,
@@ -169,7 +170,7 @@ class CellGlue:
             if not np.array_equal(known, numbers[corners]):
                 self._doubtful.append(triangle)
         for first, second, point in numbers[found.hubs].tolist():
-            self._whole.hubs.setdefault((first, second), point)
+            self._whole.hubs.setdefault(chord_of(first, second), point)
         kept = ~self._done[tile.triangles[discs.owner]]
         self._done[tile.triangles] = True
         self._discs.append(_discs_in_whole(discs, numbers, part, kept))

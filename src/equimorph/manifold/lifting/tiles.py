@@ -7,6 +7,7 @@ See docs/decisions.md, "Tiles are glued at their points".
 """
 
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 
@@ -120,9 +121,9 @@ def _points_in(whole: Pairing, tile: Tile) -> Items:
     store = whole.points
     chosen = _flags(tile.vertices, store.vertex[: store.count])
     chosen |= _flags(tile.edges, store.edge[: store.count])
-    between = (whole.tips, whole.hubs)
-    kept = [point for each in between for pair, point in each.items() if chosen[[*pair]].all()]
-    chosen[kept] = True
+    # a pair may hold a point that was kept before
+    for pair, point in chain(whole.tips.items(), whole.hubs.items()):
+        chosen[point] |= chosen[[*pair]].all()
     return np.flatnonzero(chosen)
 
 
