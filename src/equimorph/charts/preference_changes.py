@@ -23,7 +23,7 @@ from equimorph.manifold.geometry.points import VertexKind, on_fold
 from equimorph.manifold.lookup.exact_states import exact_states, root_weights
 from equimorph.structures import States
 
-PARTS, BATCH, ROUNDS, LOCATED = (3, 64), 800, 24, 3.0**-16
+PARTS, BATCH, ROUNDS, LOCATED = (3, 64), 100, 24, 3.0**-16
 """Fewest and most parts into which an edge is divided in a round, and states that are examined in
 one: few take nearly as long as many. Rounds, and the share of an edge, 2e-8, to which the change is
 located."""
