@@ -14,8 +14,11 @@ from equimorph.tolerances import LAST_STEP
 
 SWEEPS, HALVINGS = 60, 8
 """Largest number of sweeps that straighten a chain, and of lengths of a step that are tried."""
-ROUND_OFF = 1e-15
-"""Decrease of the sum of squared links, relative to it, that round-off hides."""
+ROUND_OFF = 1e-14
+"""Decrease of the sum of squared links, relative to it, that round-off hides: that of the places is
+larger than that of the links between them."""
+SAME = 1e-4
+"""Distance of the points of two straight chains, in links, below which both are one."""
 FIRST, LAST = np.array([0]), np.array([-1])
 
 
@@ -53,15 +56,30 @@ class Chains:
         self.setting, self.chains = eset.setting, list(ways)
         self.on_set, self.on_fold = Ground(self.setting, eset), Ground(self.setting, eset, True)
 
-    def straighten(self, links: int) -> list[float]:
-        """Lengths of the chains with `links` links each, after they have been straightened."""
+    @property
+    def lengths(self) -> list[float]:
+        """Sums of the links."""
+        return [float(self._links(chain).sum()) for chain in self.chains]
+
+    def straighten(self, links: int) -> None:
+        """Straighten the chains with `links` links each, and keep one of those that become one."""
         self._divide(links)
         moving = list(range(len(self.chains)))
         for _ in range(SWEEPS):
             if not moving:
                 break
             moving = self._sweep(moving)
-        return [float(self._links(chain).sum()) for chain in self.chains]
+        self._leave_out_copies()
+
+    def _leave_out_copies(self) -> None:
+        """Keep the first of several chains that were pulled to the same place."""
+        kept = list[SetPoints]()
+        for chain in self.chains:
+            place, near = self._places(chain), SAME * self._links(chain).max()
+            others = (self._places(each) for each in kept if len(each) == len(chain))
+            if all(np.linalg.norm(place - each, axis=1).max() > near for each in others):
+                kept.append(chain)
+        self.chains = kept
 
     def _links(self, chain: SetPoints) -> Float[np.ndarray, " links"]:
         return np.asarray(np.linalg.norm(np.diff(self._places(chain), axis=0), axis=1))

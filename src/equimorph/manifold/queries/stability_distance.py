@@ -190,8 +190,11 @@ def _along_the_set(
     """Length of the shortest curve on the set to the boundary, and states along it."""
     best: tuple[float, States] = (np.inf, state.batch)
     chains = Chains(eset, _ways(eset, state, stratum, boundary))
-    lengths = [chains.straighten(links) for links in LINKS]
-    for chain, short, long in zip(chains.chains, *lengths, strict=True):
+    few, many = LINKS
+    chains.straighten(few)
+    before = chains.lengths
+    chains.straighten(many)
+    for chain, short, long in zip(chains.chains, before, chains.lengths, strict=True):
         # chords fall short of arcs by the square of their length
         length = (4.0 * long - short) / 3.0
         if length < best[0]:
