@@ -96,10 +96,14 @@ def split_step(setting: Setting, step: Float[np.ndarray, "lanes full"]) -> tuple
 
 
 def fold_slopes(
-    setting: Setting, z: Lanes, p: Parameters, frames: Frames
+    setting: Setting, z: Lanes, p: Parameters, frames: Frames, border: Lanes | None = None
 ) -> Float[np.ndarray, "lanes d"]:
-    """Slope along the frame of the function that vanishes on folds."""
-    critical = Critical(setting.structure, z, p, null_border(setting.structure, z, p))
+    """Slope along the frame of the function that vanishes on folds.
+
+    border: null vectors, if they are known.
+    """
+    border = null_border(setting.structure, z, p) if border is None else border
+    critical = Critical(setting.structure, z, p, border)
     steps = [split_step(setting, frames[:, k]) for k in range(frames.shape[1])]
     return second_derivatives(critical, [(critical.v, np.zeros_like(p))], steps)[:, 0]
 

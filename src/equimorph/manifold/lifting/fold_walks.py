@@ -80,7 +80,7 @@ def _follow(pairing: Pairing, triangle: Items, fold: Items) -> list[FoldExit | N
         edge[lanes[there]] = on_sides(
             pairing.mesh, triangle[lanes[there]], apex[there], shares[there]
         )[0]
-        left[lanes[there]] = False
+        left[lanes[(apex >= 0) | (own.length == 0.0)]] = False  # on a side, none moves any more
     found, out = edge >= 0, np.zeros(len(edge), bool)
     out[found] = ~are_feasible(setting.constraints, walk.z[found], walk.p[found])
     lanes = np.flatnonzero(out)
@@ -183,9 +183,10 @@ class _Walk(Columns):
         length = np.minimum(way, self.length)
         dz, dp = split_step(setting, length[:, None] * self.tangent)
         guess = replace(self, z=self.z + dz, p=self.p + dp)
-        there = guess.inside(setting, length)
-        out = np.flatnonzero(leaves)
-        if len(out):
+        there = Pinned(guess.z, guess.p, np.zeros(len(way), bool))
+        if len(stay := np.flatnonzero(~leaves)):
+            there = there.with_rows(stay, guess.take(stay).inside(setting, length[stay]))
+        if len(out := np.flatnonzero(leaves)):
             there = there.with_rows(out, guess.take(out).on_side(setting, length[out], apex[out]))
         known = there.found[:, None]
         there = replace(
@@ -261,7 +262,7 @@ def _tangents(
     rows[:, 1:, n:] = along
     rows[:, 0] /= np.linalg.norm(rows[:, 0], axis=1, keepdims=True)
     frames = tangent_frames(setting, z, p, rows)
-    held = fold_slopes(setting, z, p, frames)[:, None]
+    held = fold_slopes(setting, z, p, frames, forms.null)[:, None]
     held /= np.maximum(np.linalg.norm(held, axis=2, keepdims=True), 1e-300)
     if d > corners.shape[1] - 1:  # no step leaves the plane
         span = plane_bases(corners / setting.scales)
