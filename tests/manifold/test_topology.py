@@ -9,6 +9,7 @@ from scipy.sparse.csgraph import connected_components
 
 from equimorph.linalg.graphs import components
 from equimorph.manifold.complex.pinches import pinched_vertices
+from equimorph.manifold.geometry.facet_kernels import join_triangles
 from equimorph.manifold.geometry.kernels import cut_rows
 from equimorph.manifold.geometry.topology import (
     adjacency,
@@ -111,6 +112,29 @@ def test_pieces_of_random_graphs_are_those_of_a_library():
         graph = coo_array((np.ones(links), pairs.T), shape=(count, count))
         wanted = connected_components(graph, directed=False)[1]
         assert np.array_equal(components(count, pairs), wanted)
+
+
+@pytest.mark.parametrize("count", [0, 1, 60])
+def test_triangles_of_an_owner_are_joined_at_their_sides(count):
+    """Side by side, against a library; sides of different sheets are different."""
+    rng = np.random.default_rng(count)
+    corners = np.ascontiguousarray(np.argsort(rng.random((count, 7)), axis=1)[:, :3])
+    sheets, owner = rng.integers(0, 2, (count, 3)), np.sort(rng.integers(0, 12, count))
+    sides = [
+        [(own, sheet, frozenset(pair)) for sheet, pair in zip(row, pairs, strict=True)]
+        for own, row, pairs in zip(
+            owner.tolist(),
+            sheets.tolist(),
+            np.stack([corners, np.roll(corners, -1, axis=1)], axis=2).tolist(),
+            strict=True,
+        )
+    ]
+    every = [side for row in sides for side in row]
+    shares, piece = np.empty((count, 3), int), np.empty(count, int)
+    join_triangles(corners, sheets, owner, shares, piece)
+    assert shares.tolist() == [[every.count(side) for side in row] for row in sides]
+    joined = [[bool(set(one) & set(other)) for other in sides] for one in sides]
+    assert np.array_equal(piece, connected_components(np.array(joined).reshape(count, count))[1])
 
 
 def test_labels_number_the_pieces_by_size():

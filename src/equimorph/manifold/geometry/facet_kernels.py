@@ -1,8 +1,12 @@
-"""Facets of cells, numbered in order, and the links across them, in linear time."""
+"""Facets of cells, numbered in order, and the links across them, in linear time.
+
+Those of the few triangles over one grid tetrahedron are compared with each other.
+"""
 
 import numpy as np
 
 from equimorph.linalg.compiled import njit
+from equimorph.linalg.graph_kernels import root_of
 
 
 @njit(nogil=True)
@@ -72,3 +76,35 @@ def join_cells(cells, base):
         facets[:many].copy(), counts[:many].copy(), of_cells,
         across[:link].copy(), places[:link].copy(),
     )  # fmt: skip
+
+
+@njit(nogil=True)
+def join_triangles(corners, sheets, owner, shares, piece):
+    """How many triangles of an owner share each side, and the pieces that they form.
+
+    corners (n, 3) of triangles whose owners (n,) are in order; sheets (n, 3) of their sides ab, bc,
+    ca: those of different sheets differ. shares (n, 3) and piece (n,) are written; pieces are
+    numbered in the order of their first triangles.
+    """
+    keys, before = np.empty(corners.size, np.int64), np.arange(owner.size)
+    for i in range(corners.size):
+        a, b = corners[i // 3, i % 3], corners[i // 3, (i % 3 + 1) % 3]
+        keys[i] = min(a, b) << 32 | max(a, b)
+    sheet, count = sheets.reshape(-1), shares.reshape(-1)
+    count[:] = 1
+    first, many = 0, 0
+    for end in range(1, owner.size + 1):
+        if end < owner.size and owner[end] == owner[first]:
+            continue
+        for i in range(3 * first, 3 * end):
+            for j in range(i + 1, 3 * end):
+                if keys[i] == keys[j] and sheet[i] == sheet[j]:
+                    count[i] += 1
+                    count[j] += 1
+                    one, other = root_of(before, i // 3), root_of(before, j // 3)
+                    before[max(one, other)] = min(one, other)
+        for t in range(first, end):
+            root = root_of(before, t)
+            piece[t] = many if root == t else piece[root]
+            many += root == t
+        first = end

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from equimorph.arrays import Bool, Int, Items, Pairs, Triples
-from equimorph.linalg.graphs import components
 from equimorph.manifold.complex.base_mesh import BaseMesh
-from equimorph.manifold.geometry.topology import keys_of, labels, runs
+from equimorph.manifold.geometry.facet_kernels import join_triangles
+from equimorph.manifold.geometry.topology import labels, runs
 from equimorph.manifold.lifting.discs import Discs
 
 
@@ -161,15 +161,8 @@ def _copies(mesh: BaseMesh, discs: Discs, wanted: Bool[np.ndarray, " N"]) -> _Co
 def _pieces(corners: Triples, owner: Items, sheet: Triples) -> tuple[Triples, Items]:
     """How many triangles share each side within a tetrahedron, and the pieces that they form.
 
-    Sides of different sheets are different, but for sheet 0.
+    Sides of different sheets are different. Owners are in order.
     """
-    base = int(corners.max(initial=0)) + 1
-    keys = np.stack([keys_of(corners[:, [k, (k + 1) % 3]], base) for k in range(3)], axis=1)
-    _, edges = np.unique(keys.ravel(), return_inverse=True)
-    local = np.repeat(owner, 3) * (edges.max(initial=0) + 1) + edges.ravel()
-    local = local * (sheet.max(initial=0) + 1) + sheet.ravel()
-    _, inverse, counts = np.unique(local, return_inverse=True, return_counts=True)
-    order = np.argsort(inverse, kind="stable")
-    same = np.flatnonzero(inverse[order[1:]] == inverse[order[:-1]])
-    pairs = np.stack([order[same], order[same + 1]], axis=1) // 3
-    return counts[inverse].reshape(-1, 3), components(len(owner), pairs)
+    shares, piece = np.empty(corners.shape, int), np.empty(len(owner), int)
+    join_triangles(*map(np.ascontiguousarray, (corners, sheet, owner)), shares, piece)
+    return shares, piece
