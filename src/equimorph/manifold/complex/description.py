@@ -22,7 +22,6 @@ from equimorph.manifold.complex.pinches import count_pinched
 from equimorph.manifold.geometry.points import are_singular
 from equimorph.manifold.geometry.setting import Setting
 from equimorph.manifold.geometry.topology import (
-    PAIR,
     Adjacency,
     Senses,
     adjacency,
@@ -202,7 +201,7 @@ def _components(
     whole: Adjacency,
     boundaries: tuple[Boundary, ...],
 ) -> tuple[Component, ...]:
-    edges = _edges_of(whole, component)
+    facets = _facets_of(whole, component)
     at_loops = np.array([boundary.vertices.flat[0] for boundary in boundaries], int)
     out = []
     for k in range(component.max(initial=-1) + 1):
@@ -212,7 +211,7 @@ def _components(
         out.append(
             Component(
                 int(own.sum()),
-                euler_characteristic(corners[own], edges[k]),
+                euler_characteristic(corners[own], facets[k]),
                 int(held[at_loops].sum()),
                 tuple(np.flatnonzero(np.bincount(cell_index[own])).tolist()),
             )
@@ -220,14 +219,11 @@ def _components(
     return tuple(out)
 
 
-def _edges_of(whole: Adjacency, component: CellNumbers) -> list[int | None]:
-    """Number of edges of each component, where it is known: where edges are facets."""
-    many = component.max(initial=-1) + 1
-    if whole.facets.shape[1] != PAIR:
-        return [None] * many
+def _facets_of(whole: Adjacency, component: CellNumbers) -> list[int]:
+    """Number of facets of each component."""
     of_facet = np.zeros(len(whole.facets), int)
     of_facet[whole.cell_facets] = component[:, None]
-    return list(np.bincount(of_facet, minlength=many).tolist())
+    return list(np.bincount(of_facet, minlength=component.max(initial=-1) + 1).tolist())
 
 
 @dataclass(frozen=True)
@@ -264,7 +260,6 @@ def _audit(
     coordinates, scales = points.p[:, frame.setting.free], frame.setting.scales
     crossings = whole.facets[crossed]
     sense = _senses(corners, cell_index, coordinates, crossings, whole, component)
-    edges = len(whole.facets) if whole.facets.shape[1] == PAIR else None
     wrong = overturned_off_folds(given.kinds, corners, sense.overturned, coordinates / scales)
     at_points = checked()
     wrong |= at_points.wrong
@@ -282,7 +277,7 @@ def _audit(
         + count_unbalanced(corners, cell_index, whole, sense, crossed & whole_crossing),
         overturned=int(sense.overturned.sum()),
         wrong=int(wrong.sum()),
-        euler_characteristic=euler_characteristic(corners, edges),
+        euler_characteristic=euler_characteristic(corners, len(whole.facets)),
         components=int(component.max(initial=-1)) + 1,
         loops=tuple((str(kind), kinds.count(kind)) for kind in sorted(set(kinds))),
         largest_residual=at_points.largest_residual,

@@ -160,13 +160,13 @@ def labels(cells: int, links: Pairs) -> CellNumbers:
     return np.asarray(rank[label])
 
 
-def euler_characteristic(cells: Cells, edges: int | None = None) -> int:
-    """Vertices − edges + triangles − tetrahedra; the number of edges may be known."""
+def euler_characteristic(cells: Cells, facets: int | None = None) -> int:
+    """Vertices − edges + triangles − tetrahedra; the number of facets may be known."""
     corners = cells.shape[1]
     numbers = [
         np.count_nonzero(np.bincount(cells.ravel())),
         *(
-            edges if edges is not None and k == PAIR else len(faces_of(cells, k))
+            facets if facets is not None and k == corners - 1 else len(faces_of(cells, k))
             for k in range(2, corners)
         ),
     ]
