@@ -293,7 +293,7 @@ def _follow_lost(pairing: Pairing, groups: list[Group], points: list[int | None]
     pairs = [(groups[k].triangle, groups[k].points[0]) for k in lost]
     for k, exit_ in zip(lost, fold_exits(pairing, pairs), strict=True):
         ends = np.array(groups[k].points)
-        if exit_ is None or exit_.inside is None or nearest_at(pairing, exit_, ends[1:]) < 0:
+        if exit_ is None or exit_.inside is None or nearest_at(pairing, [exit_], ends[1:])[0] < 0:
             continue
         z, p = exit_.inside
         if are_feasible(constraints, z[None], p[None])[0]:

@@ -173,7 +173,7 @@ def _lead_across(pairing: Pairing, chords: FoldChords) -> Flags:
     exits = fold_exits(pairing, pairs)
     return np.array(
         [
-            exit_ is not None and nearest_at(pairing, exit_, end) >= 0
+            exit_ is not None and nearest_at(pairing, [exit_], end)[0] >= 0
             for exit_, end in zip(exits, chords.ends[:, 1:], strict=True)
         ],
         bool,

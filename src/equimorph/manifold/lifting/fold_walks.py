@@ -126,17 +126,19 @@ def fold_at(pairing: Pairing, exit_: FoldExit) -> int:
     """Number of the known fold where a fold leaves a triangle, −1 if there is none."""
     store = pairing.points
     own = store.edge[: store.count] == exit_.edge
-    return nearest_at(
-        pairing, exit_, np.flatnonzero(own & (store.kind[: store.count] == VertexKind.FOLD))
-    )
+    folds = np.flatnonzero(own & (store.kind[: store.count] == VertexKind.FOLD))
+    return nearest_at(pairing, [exit_], folds)[0]
 
 
-def nearest_at(pairing: Pairing, exit_: FoldExit, points: Some) -> int:
-    """That of some points at which a fold leaves a triangle or ends there, −1 if there is none."""
+def nearest_at(pairing: Pairing, exits: Sequence[FoldExit], points: Some) -> list[int]:
+    """Those of some points at which folds leave a triangle or end there, −1 if there is none."""
+    if len(exits) == 0 or len(points) == 0:
+        return [-1] * len(exits)
     store, setting = pairing.points, pairing.setting
     place = embed(setting, store.z[points], store.p[points])
-    gap = np.linalg.norm(place - embed(setting, exit_.z[None], exit_.p[None]), axis=1)
-    return int(points[gap.argmin()]) if (gap < NOISE).any() else -1
+    there = embed(setting, *(np.stack([each[k] for each in exits]) for k in (1, 2)))
+    gap = np.linalg.norm(place - there[:, None], axis=2)
+    return list(np.where((gap < NOISE).any(axis=1), points[gap.argmin(axis=1)], -1).tolist())
 
 
 @dataclass(frozen=True)

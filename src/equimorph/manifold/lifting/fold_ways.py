@@ -44,11 +44,10 @@ def followed_ways(pairing: Pairing, plans: list[Plan], choices: list[Ways]) -> l
     for plan, ways in zip(plans, choices, strict=True):
         folds = plan.those(TURN)
         known = {fold: exits.get((plan.polygon.triangle, fold)) for fold in folds}
-        ends = {
-            fold: nearest_at(pairing, exit_, np.array(folds))
-            for fold, exit_ in known.items()
-            if exit_ is not None
-        }
+        left = {fold: exit_ for fold, exit_ in known.items() if exit_ is not None}
+        ends = dict(
+            zip(left, nearest_at(pairing, list(left.values()), np.array(folds)), strict=True)
+        )
         chords = {chord_of(fold, end) for fold, end in ends.items() if end >= 0}
         followed.append([way for way in ways if chords <= set(way)])
     return followed
