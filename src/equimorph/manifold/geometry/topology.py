@@ -70,8 +70,12 @@ class Adjacency:
 def keys_of(rows: Int[np.ndarray, "n k"], base: int) -> Items:
     """One number per sorted row of vertices below `base`."""
     assert base ** rows.shape[1] < 2**63, "more vertices than fit into a key"
-    if rows.shape[1] == 2:  # much cheaper than sorting pairs
+    if rows.shape[1] == 2:  # much cheaper than sorting pairs, or triples
         return np.asarray(np.minimum(*rows.T) * base + np.maximum(*rows.T))
+    if rows.shape[1] == 3:
+        a, b, c = rows.T
+        low, high = (f(f(a, b), c) for f in (np.minimum, np.maximum))
+        return np.asarray((low * base + (a + b + c - low - high)) * base + high)
     keys = np.zeros(len(rows), np.int64)
     for column in np.sort(rows, axis=1).T:
         keys = keys * base + column
