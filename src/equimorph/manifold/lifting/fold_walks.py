@@ -136,7 +136,8 @@ def nearest_at(pairing: Pairing, exits: Sequence[FoldExit], points: Some) -> lis
         return [-1] * len(exits)
     store, setting = pairing.points, pairing.setting
     place = embed(setting, store.z[points], store.p[points])
-    there = embed(setting, *(np.stack([each[k] for each in exits]) for k in (1, 2)))
+    z, p = np.stack([each.z for each in exits]), np.stack([each.p for each in exits])
+    there = embed(setting, z, p)
     gap = np.linalg.norm(place - there[:, None], axis=2)
     return list(np.where((gap < NOISE).any(axis=1), points[gap.argmin(axis=1)], -1).tolist())
 
