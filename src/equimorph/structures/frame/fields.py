@@ -128,8 +128,7 @@ class FrameFields(FrameMechanics, AnyFrame):
         is integrated from both ends, and the remaining difference is distributed in proportion.
         """
         model, (y, turns, strain) = self.model, self._fields(z, p)
-        psi = turns[:, model.nodes.ravel()]
-        pulls = self._pulls(y, psi, strain)
+        pulls = self._pulls(y, self._turned(turns), strain)
         stretch = 1.0 + strain + model.softness * pulls.tension
         shear = (stretch * pulls.shear).reshape(len(z), *model.nodes.shape)
         local = np.einsum("eij,lej->lei", model.stiffness, turns[:, model.nodes]) - shear
@@ -149,7 +148,7 @@ class FrameFields(FrameMechanics, AnyFrame):
     def elastic(self, z: Lanes, p: Parameters) -> tuple[NodalStrains, NodalForces]:
         """Elastic curvatures about b at the nodes, nothing about other axes, and axial forces."""
         model, (y, turns, strain) = self.model, self._fields(z, p)
-        forces = self._pulls(y, turns[:, model.nodes.ravel()], strain).tension / model.weights
+        forces = self._pulls(y, self._turned(turns), strain).tension / model.weights
         if self.pressure is not None:
             forces += self._pressed(y, turns)[0]
         bends = np.zeros((len(z), *model.nodes.shape, 3))

@@ -214,17 +214,22 @@ class FrameMechanics(DiscreteStructure):
         y = self.scalars(z, p, constant)
         return y, self.turns(z, y), multiply(y, self.model.stretch.T)[:, self.model.owner]
 
-    def _pulls(self, y: Scalars, psi: Points, strain: Points) -> Pulls:
-        """P, P' and e for turns at the points."""
-        sine, cosine = np.sin(psi), np.cos(psi)
+    def _turned(self, turns: Nodal) -> tuple[Points, Points]:
+        """Sines and cosines of ψ at the points."""
+        psi = turns[:, self.model.nodes.ravel()]
+        return np.sin(psi), np.cos(psi)
+
+    def _pulls(self, y: Scalars, turned: tuple[Points, Points], strain: Points) -> Pulls:
+        """P, P' and e for sines and cosines of the turns at the points."""
+        sine, cosine = turned
         across, along = multiply(y, self.model.sine.T), multiply(y, self.model.cosine.T)
         return Pulls(across * sine + along * cosine, across * cosine - along * sine, strain)
 
     def stretches(self, z: Lanes, p: Parameters) -> tuple[Points, Points]:
         """Turns ψ, and lengths relative to the free ones, at the points."""
         y, turns, strain = self._fields(z, p)
-        psi = turns[:, self.model.nodes.ravel()]
-        return psi, 1.0 + strain + self.model.softness * self._pulls(y, psi, strain).tension
+        tension = self._pulls(y, self._turned(turns), strain).tension
+        return turns[:, self.model.nodes.ravel()], 1.0 + strain + self.model.softness * tension
 
     # --- contract -------------------------------------------------------------------------------
 
@@ -266,7 +271,7 @@ class FrameMechanics(DiscreteStructure):
     def energy(self, z: Lanes, p: Parameters) -> Values:
         """Energy of members, springs and loads: L − λ·∂L/∂λ, so that constraints add nothing."""
         model, (y, turns, strain) = self.model, self._fields(z, p)
-        pulls = self._pulls(y, turns[:, model.nodes.ravel()], strain)
+        pulls = self._pulls(y, self._turned(turns), strain)
         total = 0.5 * (multiply(turns, self.planar_energy.assembled) * turns).sum(axis=1)
         total -= (multiply(y, model.slope.T) * turns).sum(axis=1)
         stored = (1.0 + strain + 0.5 * model.softness * pulls.tension) * pulls.tension
@@ -280,7 +285,7 @@ class FrameMechanics(DiscreteStructure):
     def nodal_moments(self, z: Lanes, p: Parameters) -> Nodal:
         """∂L/∂ψ at all nodes: zero at unknown ones, a support's couple where it is prescribed."""
         model, (y, turns, strain) = self.model, self._fields(z, p)
-        pulls = self._pulls(y, turns[:, model.nodes.ravel()], strain)
+        pulls = self._pulls(y, self._turned(turns), strain)
         stretch = 1.0 + strain + model.softness * pulls.tension
         total = multiply(turns, self.planar_energy.assembled) - multiply(y, model.slope.T)
         if self.pressure is not None:
@@ -295,13 +300,13 @@ class FrameMechanics(DiscreteStructure):
     def effort(self, z: Lanes, p: Parameters) -> Parameters:
         """∂L/∂p: what actuators bear, and minus the travel of loads."""
         model, (y, turns, strain) = self.model, self._fields(z, p)
-        psi = turns[:, model.nodes.ravel()]
-        pulls = self._pulls(y, psi, strain)
+        sine, cosine = turned = self._turned(turns)
+        pulls = self._pulls(y, turned, strain)
         stretch = 1.0 + strain + model.softness * pulls.tension
         own = model.own
         total = multiply(y, model.quadratic[:, own]) - multiply(turns, model.slope[:, own])
-        total -= multiply(stretch * np.sin(psi), model.sine[:, own])
-        total -= multiply(stretch * np.cos(psi), model.cosine[:, own])
+        total -= multiply(stretch * sine, model.sine[:, own])
+        total -= multiply(stretch * cosine, model.cosine[:, own])
         total -= multiply(pulls.tension, model.stretch[model.owner][:, own])
         held = model.place < 0
         if self.pressure is not None:
@@ -314,10 +319,10 @@ class FrameMechanics(DiscreteStructure):
         """D²F[v, w]."""
         model, at = self.model, self.model.nodes.ravel()
         (y, turns, e), *both = self._fields(z, p), *(self._fields(*each, 0.0) for each in (v, w))
-        psi, gamma = turns[:, at], model.softness
+        turned, gamma = self._turned(turns), model.softness
         (yv, tv, ev), (yw, tw, ew) = both
         dv, dw = tv[:, at], tw[:, at]
-        here, by_v, by_w = (self._pulls(each, psi, e) for each in (y, yv, yw))
+        here, by_v, by_w = (self._pulls(each, turned, e) for each in (y, yv, yw))
         # first changes of P and P', and second ones
         pv, pw = by_v.tension + here.shear * dv, by_w.tension + here.shear * dw
         sv, sw = by_v.shear - here.tension * dv, by_w.shear - here.tension * dw
@@ -332,8 +337,7 @@ class FrameMechanics(DiscreteStructure):
         # a multiplier's P = along cos ψ + across sin ψ, its first and second changes
         twice = gamma * p_vw - stretch * dv * dw
         once = first_v * dw + first_w * dv
-        sine, cosine = np.sin(psi), np.cos(psi)
-        m = self.constraints
+        (sine, cosine), m = turned, self.constraints
         total = multiply(twice * sine + once * cosine, model.sine[:, :m])
         total += multiply(twice * cosine - once * sine, model.cosine[:, :m])
         out[:, self.unknowns :] = -total

@@ -166,6 +166,16 @@ def _extrema_of_interpolants(
     return np.asarray(np.maximum(legendre.legval(x, series, tensor=False), np.abs(at_top)))
 
 
+@lru_cache
+def _fine_grid(
+    degree: int,
+) -> tuple[Float[np.ndarray, " places"], Float[np.ndarray, "places n"], Float[np.ndarray, "n n"]]:
+    """Places in an element, Legendre polynomials there, and the matrix of their derivatives."""
+    grid = np.cos(np.linspace(np.pi, 0.0, FINE * degree + 1))
+    slope = np.pad(legendre.legder(np.eye(degree + 1)), ((0, 1), (0, 0)))
+    return grid, legendre.legvander(grid, degree), slope
+
+
 def largest_norms(
     mesh: Mesh, values: Float[np.ndarray, "lanes elements order components"]
 ) -> Float[np.ndarray, "lanes elements"]:
@@ -177,17 +187,16 @@ def largest_norms(
     place of the grid alone gives values that jump, and bounds that are located at the jump.
     """
     series = np.einsum("ij,lejk->leik", mesh.reference.to_legendre, values)
-    angles = np.linspace(np.pi, 0.0, FINE * mesh.degree + 1)
-    basis = legendre.legvander(np.cos(angles), mesh.degree)
+    grid, basis, slope = _fine_grid(mesh.degree)
     sizes = np.linalg.norm(np.einsum("gi,leik->legk", basis, series), axis=3)
-    sides = np.pad(sizes, ((0, 0), (0, 0), (1, 1)), constant_values=-np.inf)
-    high = sizes >= LOWEST * sizes.max(axis=2, keepdims=True)
-    lane, element, at = np.nonzero((sizes >= sides[:, :, :-2]) & (sizes > sides[:, :, 2:]) & high)
-    slope = np.pad(legendre.legder(np.eye(mesh.degree + 1)), ((0, 1), (0, 0)))
+    largest = sizes.max(axis=2)
+    tops = sizes >= LOWEST * largest[:, :, None]
+    tops[:, :, 1:] &= sizes[:, :, 1:] >= sizes[:, :, :-1]
+    tops[:, :, :-1] &= sizes[:, :, :-1] > sizes[:, :, 1:]
+    lane, element, at = np.nonzero(tops)
     own = series[lane, element]
     first = np.einsum("ij,njk->nik", slope, own)
     second = np.einsum("ij,njk->nik", slope, first)
-    grid = np.cos(angles)
     place = grid[at]
     low = grid[np.maximum(at - 1, 0)]
     top = grid[np.minimum(at + 1, len(grid) - 1)]
@@ -199,7 +208,6 @@ def largest_norms(
         move = np.where(curved < 0.0, down / np.where(curved == 0.0, 1.0, curved), 0.0)
         place = np.clip(place - move, low, top)
     basis = legendre.legvander(place, mesh.degree)
-    largest = sizes.max(axis=2)
     polished = np.linalg.norm(np.einsum("ni,nik->nk", basis, own), axis=1)
     np.maximum.at(largest, (lane, element), polished)
     return np.asarray(largest)
