@@ -18,7 +18,7 @@ ROUND_OFF = 1e-14
 """Decrease of the sum of squared links, relative to it, that round-off hides: that of the places is
 larger than that of the links between them."""
 SAME = 1e-4
-"""Distance of the points of two straight chains, in links, below which both are one."""
+"""Distance of the points of two chains, in links, below which both become one."""
 FIRST, LAST = np.array([0]), np.array([-1])
 
 
@@ -68,18 +68,20 @@ class Chains:
         for _ in range(SWEEPS):
             if not moving:
                 break
-            moving = self._sweep(moving)
-        self._leave_out_copies()
+            left, kept = self._sweep(moving), self._different()
+            moving = [place for place, i in enumerate(kept) if i in left]
+            self.chains = [self.chains[i] for i in kept]
 
-    def _leave_out_copies(self) -> None:
-        """Keep the first of several chains that were pulled to the same place."""
-        kept = list[SetPoints]()
-        for chain in self.chains:
+    def _different(self) -> list[int]:
+        """Numbers of the chains that no earlier one is at the same place as."""
+        kept, places = list[int](), list[Float[np.ndarray, "points coordinates"]]()
+        for i, chain in enumerate(self.chains):
             place, near = self._places(chain), SAME * self._links(chain).max()
-            others = (self._places(each) for each in kept if len(each) == len(chain))
+            others = (each for each in places if len(each) == len(place))
             if all(np.linalg.norm(place - each, axis=1).max() > near for each in others):
-                kept.append(chain)
-        self.chains = kept
+                kept.append(i)
+                places.append(place)
+        return kept
 
     def _links(self, chain: SetPoints) -> Float[np.ndarray, " links"]:
         return np.asarray(np.linalg.norm(np.diff(self._places(chain), axis=0), axis=1))
