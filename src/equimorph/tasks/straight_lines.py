@@ -18,10 +18,9 @@ FINE = TraceOptions(largest_step=0.02, first_step=0.01, turning=0.05, steps=2000
 AT_GOAL = 1e-9
 """Share of a line that may be missing: steps that end at the goal but for round-off count."""
 
-GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
-ROUNDS = 16
-"""Sections of a bracket by the golden ratio: what is left of it is a 2200th, and the least value
-errs by the square of that."""
+SECTIONS, ROUNDS = 8, 6
+"""Parts into which brackets of a least value are divided, and how often: what is left is a 4000th,
+and the least value errs by the square of half of that."""
 DEEPER = 4.0
 """How much deeper a dip may be than the parabola through the ends and the middle of a line."""
 HIGHER = 2.0
@@ -93,7 +92,7 @@ def least_margins(
     """Least margin of each of some chains, where parameters move straight from state to state.
 
     Every line may be a chord that dips towards a fold. Where its middle leaves a doubt, the least
-    is searched by golden section of exact states.
+    is searched among exact states, in smaller and smaller sections.
     """
     if not chains:
         return []
@@ -106,18 +105,14 @@ def least_margins(
     low = _doubtful(states, every, chain, np.array([least.margin for least in out]))
     if not len(low):
         return out
-    owner, high = chain[low.astype(int)], low + 1.0
-    inner = [high - GOLDEN * (high - low), low + GOLDEN * (high - low)]
-    values = [_margins(states, each)[0] for each in inner]
+    owner, width = np.repeat(chain[low.astype(int)], SECTIONS - 1), 1.0
     for _ in range(ROUNDS):
-        left = values[0] < values[1]
-        low, high = np.where(left, low, inner[0]), np.where(left, inner[1], high)
-        new = np.where(left, high - GOLDEN * (high - low), low + GOLDEN * (high - low))
-        found = _margins(states, new)[0]
-        inner = [np.where(left, new, inner[1]), np.where(left, inner[0], new)]
-        values = [np.where(left, found, values[1]), np.where(left, values[0], found)]
-    places, owner = np.concatenate(inner), np.tile(owner, 2)
-    found, between = _margins(states, places)
+        width /= SECTIONS
+        inner = low[:, None] + width * np.arange(1, SECTIONS)
+        places = inner.ravel()
+        found, between = _margins(states, places)
+        low = low + width * found.reshape(inner.shape).argmin(axis=1)
+        width *= 2.0
     for number in np.unique(owner).tolist():
         own = np.flatnonzero(owner == number)
         best = own[np.argmin(found[own])]
