@@ -30,7 +30,7 @@ ROUNDS = 12
 
 
 @dataclass(frozen=True)
-class _Point(Columns):
+class Point(Columns):
     """Points on steps: lengths from their starts, the excess over the bound and its slope."""
 
     length: Values
@@ -39,12 +39,12 @@ class _Point(Columns):
 
 
 @dataclass(frozen=True)
-class _Part(Columns):
+class Part(Columns):
     """Parts of steps in which the bound may be exceeded; the error of their cubics."""
 
     step: Some
-    low: _Point
-    high: _Point
+    low: Point
+    high: Point
     doubt: Values
 
     @property
@@ -58,6 +58,17 @@ class _Part(Columns):
         return np.asarray(self.low.slope * self.width), np.asarray(self.high.slope * self.width)
 
 
+def may_exceed(part: Part, floor: float) -> Flags:
+    """Whether parts may rise above a bound; those that end above, whether more than once."""
+    (a, b), (low, high) = part.rises, (part.low.value, part.high.value)
+    top = -least_inside((-low, -high), (-a, -b), np.ones_like(low))[1]
+    # control points with one change of sign allow one root, whatever such an error of degree four
+    slack = 16.0 / 3.0 * part.doubt
+    again = (low + a / 3.0 > -slack) & (high - b / 3.0 < slack)
+    doubtful = np.where(high > floor, again, top + part.doubt > floor)
+    return np.asarray(doubtful & (part.width > NARROW))
+
+
 def hidden_violations(curve: Curve, constraint: Constraint, bracket: Bracket) -> Values:
     """Lengths at which steps exceed a bound that their ends show once at most; infinite for none.
 
@@ -67,9 +78,9 @@ def hidden_violations(curve: Curve, constraint: Constraint, bracket: Bracket) ->
     step, none = np.arange(len(bracket.step)), np.zeros(len(bracket.step))
     ends = (start, none), (bracket.after, bracket.step)
     low, high = (_point(curve, constraint, start, *end) for end in ends)
-    found, part = none + np.inf, _Part(step, low, high, none + np.inf)
+    found, part = none + np.inf, Part(step, low, high, none + np.inf)
     for _ in range(ROUNDS):
-        part = part.take(_may_exceed(part, floor) & np.isinf(found[part.step]))
+        part = part.take(may_exceed(part, floor) & np.isinf(found[part.step]))
         if len(part.step) == 0:
             break
         share = np.clip(_highest(part, floor), INNER, 1.0 - INNER)
@@ -81,13 +92,13 @@ def hidden_violations(curve: Curve, constraint: Constraint, bracket: Bracket) ->
         np.minimum.at(found, part.step[beyond], length[beyond])
         doubt = _surprise(part, middle, share)
         halves = (part.low, middle), (middle, part.high)
-        part = _Part.concatenate([_Part(part.step, *half, doubt) for half in halves])
+        part = Part.concatenate([Part(part.step, *half, doubt) for half in halves])
     return found
 
 
 def _point(
     curve: Curve, constraint: Constraint, start: Front, front: Front, length: Values
-) -> _Point:
+) -> Point:
     """Excess and its slope, per length along the tangent at the start of the step."""
     h = METRIC_DIFFERENCE / along_tangents(curve, start, front)
     here, ahead, behind = (
@@ -97,28 +108,17 @@ def _point(
             for s in (0.0, 1.0, -1.0)
         )
     )
-    return _Point(length, here, np.asarray((ahead - behind) / (2.0 * METRIC_DIFFERENCE)))
+    return Point(length, here, np.asarray((ahead - behind) / (2.0 * METRIC_DIFFERENCE)))
 
 
-def _may_exceed(part: _Part, floor: float) -> Flags:
-    """Whether the excess may rise above the bound; where it ends above, whether more than once."""
-    (a, b), (low, high) = part.rises, (part.low.value, part.high.value)
-    top = -least_inside((-low, -high), (-a, -b), np.ones_like(low))[1]
-    # control points with one change of sign allow one root, whatever such an error of degree four
-    slack = 16.0 / 3.0 * part.doubt
-    again = (low + a / 3.0 > -slack) & (high - b / 3.0 < slack)
-    doubtful = np.where(high > floor, again, top + part.doubt > floor)
-    return np.asarray(doubtful & (part.width > NARROW))
-
-
-def _highest(part: _Part, floor: float) -> Values:
+def _highest(part: Part, floor: float) -> Values:
     """Share at which the cubic is highest; the middle of parts that end beyond the bound."""
     (a, b), (low, high) = part.rises, (part.low.value, part.high.value)
     share, _ = least_inside((-low, -high), (-a, -b), np.ones_like(low))
     return np.where(high > floor, 0.5, share)
 
 
-def _surprise(part: _Part, middle: _Point, share: Values) -> Values:
+def _surprise(part: Part, middle: Point, share: Values) -> Values:
     """Error of the cubic, by its value and slope at a point inside."""
     s, (a, b), low, rise = share, part.rises, part.low.value, part.high.value - part.low.value
     c2, c3 = 3.0 * rise - 2.0 * a - b, a + b - 2.0 * rise

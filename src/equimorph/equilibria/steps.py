@@ -58,7 +58,8 @@ class Bracket(Columns):
     what: Some
 
 
-def _unit(curve: Curve, front: Front) -> Front:
+def unit_tangents(curve: Curve, front: Front) -> Front:
+    """Points with tangents of length one."""
     length = squared_length(curve.metric, curve.weight, front.tangent_z, front.tangent_t)
     norm = np.sqrt(length)
     return replace(

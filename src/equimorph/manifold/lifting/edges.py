@@ -21,8 +21,9 @@ from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.lifting.pairing import Pairing, RayMark, Rays
 from equimorph.marching.kernels import FIRST_SHARE, LEAST_COSINE, MULTIPLIER_WEIGHT
-from equimorph.model import Constraint, are_feasible
+from equimorph.model import Constraint
 
+Excess = Float[np.ndarray, "lanes constraints"]
 LONGEST = 0.5
 """Step in the metric above which the cheap way is not tried."""
 LEFT = 1e-8
@@ -40,8 +41,8 @@ def correct_ends(
     length: Values,
     index: Numbers,
     constraints: tuple[Constraint, ...],
-) -> tuple[Lanes, Flags]:
-    """Points at the ends of steps of some length along tangents, and which can be trusted.
+) -> tuple[Lanes, Flags, Excess]:
+    """Points at the ends of steps of some length along tangents, which can be trusted, and excess.
 
     A point can be if the first correction is below a quarter of the step, later ones shrink at
     least by half, the index is that of the start, the tangents differ by less than acos 0.9, and no
@@ -57,8 +58,13 @@ def correct_ends(
     end_length = np.sqrt(squared_length(structure, weight, end_tangent, one))
     good = np.asarray(end.found & (product >= LEAST_COSINE * length * end_length))
     own = np.flatnonzero(good)
-    good[own] = are_feasible(constraints, end.z[own], p[own])
-    return end.z, good
+    excess = np.full((len(good), len(constraints)), np.nan)
+    for k, constraint in enumerate(constraints):
+        excess[own, k] = constraint.excess(end.z[own], p[own])
+        own = own[excess[own, k] <= 0.0]
+    good[:] = False
+    good[own] = True
+    return end.z, good, excess
 
 
 EFFORTS = 4

@@ -6,12 +6,6 @@ constraint. New ends are new equilibria.
 
 Where rays end is predicted by tangents, and the points that are known there are taken: see
 docs/decisions.md, "Every point is corrected once, and rays are matched by tangents".
-
-On an edge an eigenvalue may vanish twice although its ends do not show it. A strip between two
-pitchforks that is narrower than the grid is crossed by edges whose ends lie on both sides of it.
-The determinant of F_z shows it: the cubic through its values at both ends, with the slopes from the
-next vertices on the same line, falls between them. There it is computed. See docs/decisions.md,
-"Strips narrower than the grid are recognised".
 """
 
 from dataclasses import dataclass
@@ -20,15 +14,13 @@ import numpy as np
 
 from equimorph.arrays import Flags, Items, Lanes, Numbers, Values
 from equimorph.columns import Columns
-from equimorph.equilibria.determinants import hides_two_zeros
-from equimorph.equilibria.steps import Bracket, Front, least_inside
 from equimorph.errors import InputError
 from equimorph.linalg.lanes import over_lanes
 from equimorph.manifold.geometry.points import VertexKind
-from equimorph.manifold.lifting.edges import LONGEST, correct_ends, trace_rays
+from equimorph.manifold.lifting.edges import LONGEST, Excess, correct_ends, trace_rays
+from equimorph.manifold.lifting.hiding_edges import BothEnds, hiding_edges
 from equimorph.manifold.lifting.kernels import flag_first_of_alike, match_rays
 from equimorph.manifold.lifting.pairing import Pairing, RayMark, Rays
-from equimorph.marching.judgement_kernels import EARLY_DIP
 from equimorph.marching.kernels import LEAST_COSINE, MULTIPLIER_WEIGHT
 from equimorph.model import Progress, are_feasible
 from equimorph.tolerances import SAME_STATE
@@ -46,13 +38,6 @@ REACH = 0.1
 there; Newton's method may go 0.25 in its first correction, and from one end only."""
 NEW, TOO_LONG = -1, -2
 """Partners of rays whose ends are not known, and of those that one step cannot lift."""
-STEEP = 1.0
-"""Change of the determinant along an edge, relative to the smaller value, from which on a cubic may
-fall to half of it on the edges around: with values 1 and slopes ∓r it falls to 1 − r/4."""
-STRAIGHT = 0.98
-"""Cosine of the angle between two edges from which on they lie on one line of the grid."""
-BothEnds = tuple[Rays, Rays]
-"""Lifted edges, seen from their starts and from their ends."""
 
 
 @dataclass(frozen=True)
@@ -179,8 +164,8 @@ def _lift_to_new_ends(pairing: Pairing, rays: Rays, ends: Ends) -> None:
     store, line = pairing.points, pairing.line(rays)
     tangent, index = ends.guesses - store.z[rays.points], store.index[rays.points]
     constraints = pairing.setting.constraints
-    z, good = correct_ends(line, ends.guesses, tangent, ends.lengths, index, constraints)
-    _enter_lifted(pairing, rays.take(good), z[good])
+    z, good, excess = correct_ends(line, ends.guesses, tangent, ends.lengths, index, constraints)
+    _enter_lifted(pairing, rays.take(good), z[good], excess[good])
 
 
 def _without_difficult(pairing: Pairing, rays: Rays) -> Rays:
@@ -190,7 +175,7 @@ def _without_difficult(pairing: Pairing, rays: Rays) -> Rays:
     return rays.take(~difficult)
 
 
-def _enter_lifted(pairing: Pairing, done: Rays, z: Lanes) -> None:
+def _enter_lifted(pairing: Pairing, done: Rays, z: Lanes, excess: Excess) -> None:
     """Enter the curves of rays that were lifted to points over their other ends."""
     store, setting, mesh = pairing.points, pairing.setting, pairing.mesh
     vertices = mesh.edges[done.edges, 1 - done.sides]
@@ -200,6 +185,7 @@ def _enter_lifted(pairing: Pairing, done: Rays, z: Lanes) -> None:
     pairing.fit()
     # it was counted a correction before the last one; where eigenvalues nearly vanish it may differ
     pairing.slopes.fit(setting, store)
+    pairing.slopes.excess[ids[new]] = excess[new]
     counted = pairing.slopes.index[ids]
     same = np.flatnonzero(counted == store.index[done.points])
     store.index[ids[new]] = counted[new]
@@ -232,15 +218,11 @@ def _match_ends(pairing: Pairing, rays: Rays) -> Ends:
 
 
 def take_back_hiding(pairing: Pairing) -> None:
-    """Forget curves that hide two zeros, of those that are new; their edges need more effort."""
+    """Forget curves that hide zeros or violations, of new ones; their edges need more effort."""
     curves, rays = _new(pairing)
-    for hint in (_are_steep, _dip, _hide):
-        if len(curves) == 0:
-            return
-        some = np.flatnonzero(hint(pairing, rays))
-        curves, rays = curves[some], (rays[0].take(some), rays[1].take(some))
-    pairing.effort[rays[0].edges] = 1
-    for curve in curves.tolist():
+    some = hiding_edges(pairing, rays)
+    pairing.effort[rays[0].edges[some]] = 1
+    for curve in curves[some].tolist():
         pairing.forget(curve, RayMark.HARD)
 
 
@@ -262,71 +244,3 @@ def _new(pairing: Pairing) -> tuple[Numbers, BothEnds]:
     own = np.flatnonzero(alive & plain & (end >= 0) & (pairing.effort[edges] == 0))
     rays = Rays(start, edges, sides), Rays(end, edges, 1 - sides)
     return curves[own], (rays[0].take(own), rays[1].take(own))
-
-
-def _determinants(pairing: Pairing, points: Items) -> Values:
-    """Determinants of F_z at points, nan for the number −1."""
-    pairing.slopes.fit(pairing.setting, pairing.points)
-    return np.where(points < 0, np.nan, pairing.slopes.determinant[points])
-
-
-def _are_steep(pairing: Pairing, rays: BothEnds) -> Flags:
-    """Edges at an end of which the determinant changes much along some edge."""
-    one, other = (_determinants(pairing, each.points) for each in rays)
-    with np.errstate(invalid="ignore"):  # of values that overflow
-        much = np.abs(other - one) > STEEP * np.fmin(np.abs(one), np.abs(other))
-    steep = np.zeros(pairing.points.count, bool)
-    for each in rays:
-        steep[each.points[much]] = True
-    return np.asarray(steep[rays[0].points] | steep[rays[1].points])
-
-
-def _dip(pairing: Pairing, rays: BothEnds) -> Flags:
-    """Where the cubic through determinants falls below half the smaller one at both ends."""
-    ends = np.stack([_determinants(pairing, each.points) for each in rays])
-    with np.errstate(divide="ignore", invalid="ignore"):
-        scale = np.copysign(np.abs(ends).min(axis=0), ends[0])
-        start, end = ends / scale
-        before, after = (_slope(pairing, *each) / scale for each in zip(rays, ends, strict=True))
-        rise = 2.0 * (end - start)
-        slopes = (
-            np.where(np.isnan(before), rise + after, before),
-            np.where(np.isnan(after), rise - before, -after),
-        )
-        least = least_inside((start, end), slopes, np.ones(len(rise)))[1]
-    return np.asarray((least < EARLY_DIP) | (np.isnan(slopes[0]) & ~np.isnan(rise)))
-
-
-def _slope(pairing: Pairing, rays: Rays, here: Values) -> Values:
-    """Slope of the determinant, for an edge, from the next point behind its start.
-
-    It lies on the same line of the grid and on the same sheet; nan where there is none.
-    """
-    mesh = pairing.mesh
-    vertex = mesh.edges[rays.edges, rays.sides]
-    around = pairing.incident[vertex]
-    outward = np.where(mesh.edges[around, 0] == vertex[:, None], 1.0, -1.0)
-    directions = outward[..., None] * mesh.spans(around)
-    own = np.where(rays.sides == 0, 1.0, -1.0)[:, None] * mesh.spans(rays.edges)
-    lengths, length = np.linalg.norm(directions, axis=2), np.linalg.norm(own, axis=1)
-    cosine = -(directions @ own[:, :, None])[..., 0] / (lengths * length[:, None])
-    cosine[(around < 0) | ~mesh.edges_in_use[around]] = -1.0
-    slot, every = cosine.argmax(axis=1), np.arange(len(cosine))
-    behind = np.full(len(cosine), -1)
-    curves = pairing.rays[rays.points, slot]
-    lanes = np.flatnonzero((cosine[every, slot] > STRAIGHT) & (curves >= 0))
-    lanes = lanes[pairing.curves.plain[curves[lanes]]]
-    start, end = pairing.curves.start[curves[lanes]], pairing.curves.end[curves[lanes]]
-    behind[lanes] = np.where(start == rays.points[lanes], end, start)
-    return np.asarray((here - _determinants(pairing, behind)) * length / lengths[every, slot])
-
-
-def _hide(pairing: Pairing, rays: BothEnds) -> Flags:
-    """Whether the determinant vanishes inside edges, by its values there."""
-    line, one, fronts = pairing.line(rays[0]), np.ones(len(rays[0].points)), []
-    for t, side in zip((0.0 * one, one), rays, strict=True):
-        z = pairing.points.z[side.points]
-        tangent = line.advance(z, t, np.zeros_like(z), one, 0.0 * one).tangent_z
-        fronts.append(Front(z, t, tangent, one, pairing.points.index[side.points]))
-    lanes = np.arange(len(one))
-    return hides_two_zeros(line, Bracket(lanes, fronts[0], fronts[1], one, 0.0 * one, lanes))

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from equimorph.arrays import Float, Int, Items
+from equimorph.arrays import Float, Int, Items, ItemValues
 from equimorph.columns import Columns
 from equimorph.equilibria import ParameterLine
 from equimorph.linalg.determinants import in_units
@@ -30,18 +30,20 @@ LAST = 1e-13, 1e-6
 
 @dataclass
 class Slopes:
-    """Of each point: tangents along the free parameters, index, and determinant of F_z.
+    """Of each point: tangents along the free parameters, index, determinant of F_z, excess.
 
     Computed once, when it is first asked for; the Newton step that comes with them is the last one
     of the point. Points that lie over no grid vertex have none.
 
     tangents: changes of z for unit changes of the parameters; index: `NONE` where there are none;
-    unit: power of two in which determinants are measured, that of most of the first.
+    excess: over each constraint, nan where nobody asked for it; unit: power of two in which
+    determinants are measured, that of most of the first.
     """
 
     tangents: Float[np.ndarray, "capacity d size"]
     index: Int[np.ndarray, " capacity"]
     determinant: Float[np.ndarray, " capacity"]
+    excess: Float[np.ndarray, "capacity constraints"]
     count: int = 0
     unit: float | None = None
 
@@ -49,7 +51,8 @@ class Slopes:
     def empty(cls, setting: Setting) -> "Slopes":
         """Return an empty table."""
         shape = (0, len(setting.free), setting.structure.size)
-        return cls(np.zeros(shape), np.zeros(0, int), np.zeros(0))
+        excess = np.zeros((0, len(setting.constraints)))
+        return cls(np.zeros(shape), np.zeros(0, int), np.zeros(0), excess)
 
     def fit(self, setting: Setting, points: Points) -> None:
         """Compute what is missing.
@@ -78,12 +81,12 @@ class Slopes:
         """Make room for as many points as there may be."""
         known = len(self.index)
         if known < capacity:
-            for name in ("tangents", "index", "determinant"):
+            for name in ("tangents", "index", "determinant", "excess"):
                 old = getattr(self, name)
                 new = np.empty((capacity, *old.shape[1:]), old.dtype)
                 new[:known] = old
                 setattr(self, name, new)
-            self.index[known:] = NONE
+            self.index[known:], self.excess[known:] = NONE, np.nan
 
 
 class RayMark(IntEnum):
@@ -179,6 +182,15 @@ class Pairing:
         start = setting.parameters(mesh.vertices[mesh.edges[rays.edges, rays.sides]])
         end = setting.parameters(mesh.vertices[mesh.edges[rays.edges, 1 - rays.sides]])
         return ParameterLine(setting.structure, start, end - start)
+
+    def excess(self, points: Items, constraint: int) -> ItemValues:
+        """Excess of points over one of the constraints."""
+        self.slopes.fit(self.setting, self.points)
+        known = self.slopes.excess[:, constraint]
+        new = points[np.isnan(known[points])]
+        z, p = self.points.z[new], self.points.p[new]
+        known[new] = self.setting.constraints[constraint].excess(z, p)
+        return np.asarray(known[points])
 
     def crossing(
         self, z: Float[np.ndarray, " size"], p: Float[np.ndarray, " P"], index: int, edge: int
