@@ -21,6 +21,7 @@ from equimorph.manifold.lifting.descents_of_set import descents_of_set, spread_o
 from equimorph.manifold.lifting.grid import bisect, split_at
 from equimorph.manifold.lifting.hidden_islands import hidden_islands
 from equimorph.manifold.lifting.pairing import Pairing
+from equimorph.manifold.lifting.parted_pieces import between_pieces
 from equimorph.manifold.lifting.seeds import Seeds, polish
 from equimorph.manifold.lifting.states_in_sides import are_grazing, states_in_sides
 from equimorph.manifold.lookup.exact_states import exact_states, lift_to
@@ -103,7 +104,8 @@ def _missing(eset: EquilibriumSet, places: list[dict[str, float]], seed: int) ->
     found = join_states(structure, [*searched, scattered[np.flatnonzero(resolved)]])
     told = (found, led.landed, met, beside)
     entering = in_sides[np.flatnonzero(in_sides.resolved)]
-    lacking = join_states(structure, [*(_lacking(each, eset) for each in told), entering])
+    parted = between_pieces(eset)
+    lacking = join_states(structure, [*(_lacking(each, eset) for each in told), entering, parted])
     dropped = [each.unresolved for each in searched if each.unresolved is not None]
     dropped += [_within(pools, *each) for each in pools.unresolved]
     dropped.append(scattered[np.flatnonzero(~resolved)])
