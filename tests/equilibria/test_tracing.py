@@ -9,7 +9,7 @@ from equimorph.equilibria.curves import AlongCurve, along_parameters, dual
 from equimorph.equilibria.locate import locate_branch_point
 from equimorph.equilibria.point_conditions import Plane
 from equimorph.equilibria.settle import settle
-from equimorph.equilibria.steps import Bracket, Front, _unit, step_along
+from equimorph.equilibria.steps import Bracket, Front, step_along, unit_tangents
 from equimorph.equilibria.trace import Batching
 from equimorph.equilibria.trace_options import EventCode
 from equimorph.structures import States
@@ -19,7 +19,7 @@ from oracles.polynomial import Polynomial, fold_form, pitchfork_form
 def initial_front(curve, z, t):
     """Unit tangents at known points, pointing towards growing t."""
     step = curve.advance(z, t, np.zeros_like(z), np.ones(len(z)), np.zeros(len(z)))
-    return _unit(curve, Front(z + step.dz, t, step.tangent_z, step.tangent_t, step.index))
+    return unit_tangents(curve, Front(z + step.dz, t, step.tangent_z, step.tangent_t, step.index))
 
 
 def lines(structure, z, start, stop):

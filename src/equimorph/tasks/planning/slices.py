@@ -15,6 +15,7 @@ from itertools import combinations, pairwise
 import numpy as np
 
 from equimorph.arrays import Pairs
+from equimorph.errors import InputError
 from equimorph.linalg.graphs import components, shortest_path
 from equimorph.manifold import EquilibriumSet, equilibrium_set
 from equimorph.manifold.queries.locate import pieces_of
@@ -81,18 +82,23 @@ class Slices:
             yield pair
 
     def _add(self, names: tuple[str, ...], base: int) -> bool:
-        """Compute the slice through a station, join it to the others; whether it is a new one."""
+        """Compute the slice through a station, join it to the others; whether it is a new one.
+
+        Nor is there one where the set is refused: constraints need not bound it.
+        """
         state, number = self.stations[base], len(self.sets)
         like = [k for k, each in enumerate(self.sets) if each.names == names]
         if any(self._holds(self.sets[k], state) for k in like):
             return False
         fixed = {name: value for name, value in state.parameters.items() if name not in names}
         box = Box(**{name: self.sides[name] for name in names})
-        self.sets.append(
-            equilibrium_set(
+        try:
+            eset = equilibrium_set(
                 self.structure, box, fixed=fixed, within=self.within, intervals=INTERVALS
             )
-        )
+        except InputError:  # states without end over a point: lifts alone may still lead there
+            return False
+        self.sets.append(eset)
         for station in range(len(self.stations)):
             self._enter(number, station)
         here = self.sets[number].at(**{name: state[name] for name in names}).stable
