@@ -134,6 +134,10 @@ class SpaceFlows(NamedTuple):
     supports: Float[np.ndarray, "flows joints 3"]
 
 
+Pivots = list[tuple[int, SpaceFlows]]
+"""Numbers of slides, and for each the circulation that removes forces along it."""
+
+
 @dataclass(frozen=True, eq=False)
 class SpaceStatics:
     """Forces in pieces between joints, some of which are held along given directions."""
@@ -170,9 +174,8 @@ class SpaceStatics:
             found += [(j, row) for row in rows[:free] if free > 0 and sizes[0] > NOTHING]
         return found
 
-    @cached_property
-    def _reduced(self) -> tuple[SpaceFlows, list[tuple[int, SpaceFlows]]]:
-        """Circulations without forces along slides, and for each slide the one that removes it."""
+    def circulations(self) -> tuple[SpaceFlows, Pivots]:
+        """Forces of independent cycles without any along slides, and what removes these."""
         flows, made = [], {}
         for axis, graph in enumerate(self._graphs):
             if id(graph) not in made:
@@ -197,19 +200,17 @@ class SpaceStatics:
             pivots.append((k, one))
         return SpaceFlows(members, supports), pivots
 
-    def circulations(self) -> SpaceFlows:
-        """Forces of independent cycles."""
-        return self._reduced[0]
-
-    def carrying_forces(self, loads: Float[np.ndarray, "flows joints 3"]) -> SpaceFlows:
-        """Forces that carry loads on the joints to the ground."""
+    def carrying_forces(
+        self, loads: Float[np.ndarray, "flows joints 3"], pivots: Pivots
+    ) -> SpaceFlows:
+        """Forces that carry loads on the joints to the ground; `pivots`: see `circulations`."""
         parts = []
         for axis, graph in enumerate(self._graphs):
             found = graph.carrying_forces(np.ascontiguousarray(loads[:, :, axis]))
             parts.append(_along(axis, found.members, found.supports))
         members = np.sum([part.members for part in parts], axis=0)
         supports = np.sum([part.supports for part in parts], axis=0)
-        for k, one in self._reduced[1]:
+        for k, one in pivots:
             j, direction = self._slides[k]
             forces = (supports[:, j] @ direction)[:, None, None]
             members, supports = members - forces * one.members, supports - forces * one.supports

@@ -67,7 +67,7 @@ class SpatialFrameFields(OrbitFrameMechanics, AnyFrame):
         joints = len(self.model.network.joints)
         loads = np.zeros((3 * joints, joints, 3))
         loads[np.arange(3 * joints), np.arange(3 * joints) // 3, np.arange(3 * joints) % 3] = 1.0
-        return self.model.statics.carrying_forces(loads)
+        return self.model.carrying_forces(loads)
 
     @cached_property
     def _drawn_chords(self) -> Float[np.ndarray, "pieces 3"]:

@@ -11,7 +11,7 @@ import numpy as np
 
 from equimorph.arrays import Bool, Float, Int
 from equimorph.structures.frame.any_model import AnyFrameModel
-from equimorph.structures.frame.statics import NOTHING, SpaceFlows, SpaceStatics
+from equimorph.structures.frame.statics import NOTHING, Pivots, SpaceFlows, SpaceStatics
 from equimorph.structures.space_frame.network import SpatialNetwork, Turning
 from equimorph.structures.spatial.quaternions import exponential, matrices
 
@@ -131,7 +131,7 @@ class SpatialFrameModel(AnyFrameModel):
     @cached_property
     def multipliers(self) -> int:
         """Number of forces that balance without loads."""
-        return len(self._circulating.members)
+        return len(self.forces.members) - len(self.loads) - 1
 
     # --- forces ---------------------------------------------------------------------------------
 
@@ -141,18 +141,23 @@ class SpatialFrameModel(AnyFrameModel):
         made = self.network
         return SpaceStatics(made.joints, made.ends, [each.directions for each in made.supports])
 
-    @cached_property
-    def _circulating(self) -> SpaceFlows:
-        return self.statics.circulations()
-
-    @cached_property
+    @property
     def forces(self) -> SpaceFlows:
         """Forces at the starts of the pieces, and of the supports, by scalar."""
-        around, carried = self._circulating, self.statics.carrying_forces(self.loads)
+        return self._balanced[0]
+
+    def carrying_forces(self, loads: Float[np.ndarray, "flows joints 3"]) -> SpaceFlows:
+        """Forces that carry loads on the joints to the ground."""
+        return self.statics.carrying_forces(loads, self._balanced[1])
+
+    @cached_property
+    def _balanced(self) -> tuple[SpaceFlows, Pivots]:
+        around, pivots = self.statics.circulations()
+        carried = self.statics.carrying_forces(self.loads, pivots)
         none = SpaceFlows(np.zeros((1, self.pieces, 3)), np.zeros((1, len(self.network.joints), 3)))
         parts = zip(around, carried, none, strict=True)
         members, supports = (np.concatenate(each) for each in parts)
-        return SpaceFlows(members, supports)
+        return SpaceFlows(members, supports), pivots
 
     @cached_property
     def acting(self) -> Acting:
