@@ -122,7 +122,20 @@ Test = Callable[[Critical], Values]
 
 def null_border(structure: Equations, z: Lanes, p: Parameters) -> Lanes:
     """Unit vectors near the null vectors of F_z, by bordered solves that stay regular there."""
-    system = structure.linear_system(z, p, np.zeros((len(z), 0, p.shape[1])))
+    return _null_border(_system_at(structure, z, p), z)
+
+
+def nearly_singular(structure: Equations, z: Lanes, p: Parameters) -> Critical:
+    """Points seen through unit vectors near their null vectors."""
+    system = _system_at(structure, z, p)
+    return Critical(structure, z, p, _null_border(system, z), system)
+
+
+def _system_at(structure: Equations, z: Lanes, p: Parameters) -> LinearSystem:
+    return structure.linear_system(z, p, np.zeros((len(z), 0, p.shape[1])))
+
+
+def _null_border(system: LinearSystem, z: Lanes) -> Lanes:
     b = np.tile(np.cos(1.3 * np.arange(z.shape[1])) + 1.1, (len(z), 1))
     corner, rhs = np.zeros((len(z), 1, 1)), np.zeros((len(z), 1, z.shape[1] + 1))
     rhs[:, 0, -1] = 1.0

@@ -31,7 +31,8 @@ AT_ONCE = 1024
 Counts = Numbers
 
 NOT_LOCATED = "a hidden pair of events could not be located"
-REGULAR_ENDS = (EventCode.ARRIVED, EventCode.RETURNED, EventCode.CONSTRAINT)
+REGULAR_ENDS = EventCode.ARRIVED | EventCode.RETURNED | EventCode.CONSTRAINT
+"""Bits of the events at whose points curves are regular."""
 
 
 def with_hidden_events(curve: Curve, z: Lanes, outcome: Traces, options: TraceOptions) -> Traces:
@@ -83,7 +84,7 @@ def _before_ends(curve: Curve, points: Points, outcome: Traces) -> Events:
     They show where the index at the end differs from that which the steps imply.
     """
     last = np.flatnonzero(np.append(np.diff(points.lanes) != 0, True))
-    last = last[np.isin(outcome.code[points.lanes[last]], REGULAR_ENDS)]
+    last = last[_regular(outcome.code[points.lanes[last]])]
     if len(last) == 0:
         return Events.join([], curve.structure.size)
     p = curve.take(points.lanes[last]).parameters(points.t[last])
@@ -110,8 +111,13 @@ def recorded_points(curve: Curve, z: Lanes, outcome: Traces) -> Points:
     index = curve.structure.index(z, curve.parameters(none))
     start = Points(lanes, none, z, none, index)
     end = Points(lanes, outcome.travelled, outcome.z, outcome.t, outcome.index)
-    regular = end.take(np.isin(outcome.code, REGULAR_ENDS))
+    regular = end.take(_regular(outcome.code))
     return Points.join([start, outcome.points, regular], z.shape[1])
+
+
+def _regular(code: Some) -> Flags:
+    """Whether lanes ended at regular points."""
+    return np.asarray((code > 0) & (code & REGULAR_ENDS != 0))
 
 
 def hidden_events(curve: Curve, points: Points, options: TraceOptions) -> Events:
@@ -190,7 +196,7 @@ def with_multiple_points(
     `curve`, `start`: curves and unknowns at their beginning, one per lane. `outcome`: how the lanes
     ended.
     """
-    ended = np.flatnonzero(np.isin(outcome.code, (EventCode.LOST, EventCode.FOLD)))
+    ended = np.flatnonzero((outcome.code == EventCode.LOST) | (outcome.code == EventCode.FOLD))
     if len(ended) == 0 or not curve.folds_change_index:
         return outcome
     code, why = outcome.code.copy(), dict(outcome.why)
@@ -223,7 +229,9 @@ def multiplicity(structure: Structure, z: Lanes, p: Parameters, near: Values) ->
     """Number of eigenvalues of the constrained Hessian, in the metric, within ±near of zero."""
     if len(z) == 0:
         return np.zeros(0, int)
-    return np.asarray(count_below(structure, z, p, near) - count_below(structure, z, p, -near))
+    twice = np.tile(z, (2, 1)), np.tile(p, (2, 1))
+    above, below = count_below(structure, *twice, np.concatenate([near, -near])).reshape(2, -1)
+    return np.asarray(above - below)
 
 
 def _small_eigenvalue(structure: Structure, z: Lanes, p: Parameters) -> Values:

@@ -12,7 +12,7 @@ import numpy as np
 
 from equimorph.arrays import Flags, Float, Lanes, Numbers, Some
 from equimorph.columns import Columns
-from equimorph.equilibria.critical import Critical, null_border
+from equimorph.equilibria.critical import nearly_singular
 from equimorph.equilibria.curves import Curve, squared_length
 from equimorph.equilibria.determinants import determinant, may_vanish
 from equimorph.equilibria.events import Events, locate_all
@@ -54,8 +54,7 @@ def probe_at(curve: Curve, front: Front, length: Values) -> Probe:
     Between eigenvalues ±σ, b is none of either, and g has a pole; ``g/|v|`` is ±σ there, too.
     """
     p = curve.parameters(front.t)
-    b = null_border(curve.structure, front.z, p)
-    at = Critical(curve.structure, front.z, p, b)
+    at = nearly_singular(curve.structure, front.z, p)
     slope = at.second(front.tangent_z, front.tangent_t[:, None] * curve.rate(front.t))
     size = np.linalg.norm(at.v, axis=1)
     return Probe(front, -at.g / size, slope / size**2, length)
@@ -288,7 +287,7 @@ def _at_the_least(curve: Curve, piece: _Piece, options: TraceOptions) -> Events:
 def _turns(curve: Curve, z: Lanes, t: Values) -> Flags:
     """Whether vᵀF_t is not zero at singular points: folds in which the path does not turn."""
     p = curve.parameters(t)
-    at = Critical(curve.structure, z, p, null_border(curve.structure, z, p))
+    at = nearly_singular(curve.structure, z, p)
     column = curve.structure.parameter_derivative(z, p, curve.rate(t))
     size, along = np.linalg.norm(column, axis=1), np.abs(at.along(curve.rate(t)))
     return np.asarray((along > 1e-6 * size) & (size > 1e-6))

@@ -30,6 +30,8 @@ from equimorph.model import Constraint, Progress
 from equimorph.structures import State, States
 
 Words = Shaped[np.ndarray, " lanes"]
+UNRECORDED = TraceOptions(record=False)
+"""Options of lifts if none are given."""
 WORD = "U24"
 """Array of kinds of events and of criticality: room for the longest."""
 __all__ = ["Event", "Lifts", "Path", "check_start", "lift", "way_points"]
@@ -353,10 +355,7 @@ def lift(
     'arrived'
     """
     one = isinstance(state, State)
-    # what hides in the steps of one state is searched for afterwards, more thoroughly
-    kept = {"record": True, "look_inside": False} if one else {}
-    through = {"through_folds": through_folds, "through_branch_points": through_folds}
-    options = replace(options or TraceOptions(record=False), **through, **kept)
+    options = (options or UNRECORDED).following(one=one, through_folds=through_folds)
     if isinstance(state, States):
         check_starts(state)
         return lift_many(state, to, tuple(within), options, progress)

@@ -8,8 +8,9 @@ import numpy as np
 
 from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Shaped, Values
-from equimorph.equilibria.legs import check_starts, violations
-from equimorph.equilibria.lift import Path, lift
+from equimorph.equilibria.legs import check_start, check_starts, violations
+from equimorph.equilibria.lift import UNRECORDED, Path, lift_many
+from equimorph.equilibria.paths import lift_one
 from equimorph.equilibria.trace_options import TraceOptions
 from equimorph.errors import InputError
 from equimorph.model import Constraint, Progress, position
@@ -142,17 +143,19 @@ def limit_load(
     parameters = state.structure.parameters
     steered = parameters[position(parameters, load)]
     bound = 100.0 * steered.scale if bound is None else steered.check(bound)
-    rise = {load: bound}
+    rise, within = {load: bound}, tuple(within)
+    options = (options or UNRECORDED).following(one=isinstance(state, State))
     if isinstance(state, States):
-        return _many(state, rise, tuple(within), options, progress)
+        return _many(state, rise, within, options, progress)
     if not bound > state[load]:
         raise InputError(f"`bound` must exceed {load} = {state[load]:g}; got {bound!r}.")
     if not state.stable:
         raise InputError(f"`state` must be stable; got index {state.index}.")
     for constraint in within:
-        if not constraint.holds(state.batch)[0]:
+        if not constraint.excess(state.batch.z, state.batch.p)[0] <= 0.0:
             return LimitLoad(np.nan, "undefined unloaded", state, None, None, str(constraint))
-    path = lift(state, rise, within=within, options=options, progress=progress)
+    check_start(state)
+    path = lift_one(state, rise, within, options, progress)
     end = path.end
     kind = "none below the bound" if end.kind == "arrived" else end.kind
     value = float(path.states[load].max()) if kind != "lost" else np.nan
@@ -163,7 +166,7 @@ def _many(
     states: States,
     rise: dict[str, float],
     within: tuple[Constraint, ...],
-    options: TraceOptions | None,
+    options: TraceOptions,
     progress: Progress | None,
 ) -> LimitLoads:
     [(load, bound)] = rise.items()
@@ -176,7 +179,7 @@ def _many(
         index = int(states.index[unstable[0]])
         raise InputError(f"`state` must be stable; got index {index} in number {unstable[0]}.")
     undefined = violations(states, within)
-    ended = lift(states, rise, within=within, options=options, progress=progress)
+    ended = lift_many(states, rise, within, options, progress)
     kind = np.where(ended.arrived, "none below the bound", ended.kind)
     kind = np.where(undefined, "undefined unloaded", kind)
     unknown = np.isin(kind, ("undefined unloaded", "lost", "cancelled"))

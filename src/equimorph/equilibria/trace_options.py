@@ -107,6 +107,13 @@ class TraceOptions:
         """Whether branch points have to be located."""
         return self.locate_passed or not self.through_branch_points
 
+    def following(self, *, one: bool, through_folds: bool = False) -> "TraceOptions":
+        """Return the options of lifts that go through folds or not; of one state, or of many.
+
+        What hides in the steps of one state is searched for afterwards, more thoroughly.
+        """
+        return _following(self, one, through_folds)
+
     def table(self) -> Float[np.ndarray, "4 levels"]:
         """First and largest step, turning and number of steps, for the first try and retries."""
         return _table(self)
@@ -121,6 +128,12 @@ class TraceOptions:
             steps=self.steps * 4,
             retries=self.retries - 1,
         )
+
+
+@lru_cache(maxsize=16)
+def _following(options: TraceOptions, one: bool, through: bool) -> TraceOptions:
+    options = replace(options, through_folds=through, through_branch_points=through)
+    return replace(options, record=True, look_inside=False) if one else options
 
 
 @lru_cache(maxsize=16)
