@@ -1,6 +1,8 @@
 """Records of columns: what is known of many lanes, points or cells, one row for each."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import cache
+from operator import attrgetter
 from typing import Any, ClassVar, TypeVar
 
 import numpy as np
@@ -23,7 +25,12 @@ class Columns:
         self: Record, rows: Int[np.ndarray, " some"] | Bool[np.ndarray, " all"] | slice
     ) -> Record:
         """Return a selection of the rows, by numbers, flags or a slice."""
-        return type(self)(*[_selection(field, rows) for field in self._fields])
+        return type(self)(
+            *[
+                field[rows] if isinstance(field, np.ndarray) else _selection(field, rows)
+                for field in self._fields
+            ]
+        )
 
     @classmethod
     def concatenate(cls: type[Record], parts: Sequence[Record]) -> Record:
@@ -42,13 +49,20 @@ class Columns:
         return self.with_rows(np.flatnonzero(~flags), others.take(~flags))
 
     @property
-    def _fields(self) -> list[Any]:
-        return [getattr(self, name) for name in self.__match_args__]
+    def _fields(self) -> tuple[Any, ...]:
+        return _reader(type(self))(self)
+
+
+@cache
+def _reader(kind: type[Columns]) -> Callable[[Any], tuple[Any, ...]]:
+    """How the fields of records of a class are read, all at once."""
+    names = kind.__match_args__
+    if len(names) < 2:
+        return lambda record: tuple(getattr(record, name) for name in names)
+    return attrgetter(*names)
 
 
 def _selection(field: Any, rows: Any) -> Any:
-    if isinstance(field, np.ndarray):
-        return field[rows]
     return field.take(rows) if hasattr(field, "take") else field
 
 

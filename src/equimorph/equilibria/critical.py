@@ -140,9 +140,13 @@ def _null_border(system: LinearSystem, z: Lanes) -> Lanes:
     corner, rhs = np.zeros((len(z), 1, 1)), np.zeros((len(z), 1, z.shape[1] + 1))
     rhs[:, 0, -1] = 1.0
     for _ in range(4):
-        b = (b / np.linalg.norm(b, axis=1, keepdims=True))[:, None]
+        b = _unit(b)[:, None]
         b = system.solve(rhs, (b, b, corner)).x[:, 0, :-1]
-    return np.ascontiguousarray(b / np.linalg.norm(b, axis=1, keepdims=True))
+    return np.ascontiguousarray(_unit(b))
+
+
+def _unit(vectors: Lanes) -> Lanes:
+    return np.asarray(vectors / np.sqrt((vectors * vectors).sum(axis=1, keepdims=True)))
 
 
 def null_vectors(

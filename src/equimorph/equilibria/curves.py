@@ -2,6 +2,7 @@
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Protocol, runtime_checkable
 
 import numpy as np
@@ -118,20 +119,20 @@ class ParameterLine(PlainCurve):
     start: Parameters
     velocity: Parameters
 
-    @property
+    @cached_property
     def weight(self) -> Values:
         """Scaled length of the line."""
         return np.asarray(np.linalg.norm(self.velocity / self.structure.scales, axis=1))
 
     def take(self, lanes: Some) -> "ParameterLine":
         """Return some of the lanes."""
-        start, velocity = (np.take(each, lanes, axis=0) for each in (self.start, self.velocity))
+        start, velocity = self.start.take(lanes, axis=0), self.velocity.take(lanes, axis=0)
         return ParameterLine(self.structure, start, velocity)
 
     def parameters(self, t: Values) -> Parameters:
         """p(t)."""
         # products of whole arrays: with rows of few numbers these cost a third
-        along = np.repeat(t, self.velocity.shape[1]).reshape(self.velocity.shape)
+        along = t.repeat(self.velocity.shape[1]).reshape(self.velocity.shape)
         along *= self.velocity
         along += self.start
         return along

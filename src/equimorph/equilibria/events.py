@@ -3,7 +3,9 @@
 See docs/decisions.md, "Events are judged by the point itself".
 """
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import lru_cache, partial
 
 import numpy as np
 
@@ -20,6 +22,7 @@ from equimorph.equilibria.locate import (
 )
 from equimorph.equilibria.steps import Bracket
 from equimorph.equilibria.trace_options import EventCode, TraceOptions
+from equimorph.marching.kernels import CONSTRAINT
 from equimorph.model import Constraint, worst_excess
 
 
@@ -44,11 +47,7 @@ class Events(Columns):
         """All events of some parts, sorted by lane and then by arclength."""
         some = [part for part in parts if len(part.lanes)]
         if not some:
-            none = np.zeros(0, int)
-            return cls(
-                none, none, np.zeros((0, size)), np.zeros(0), np.zeros(0),
-                np.zeros((0, 2), int), np.zeros(0, bool),
-            )  # fmt: skip
+            return _no_events(size)
         whole = some[0] if len(some) == 1 else cls.concatenate(some)
         if len(whole.lanes) == 1:
             return whole
@@ -61,6 +60,24 @@ class Events(Columns):
         return np.asarray(np.where(passed, self.index[before, 1], self.index[events, 0]))
 
 
+@lru_cache(maxsize=64)
+def _no_events(size: int) -> Events:
+    """None; without any entry, so that all may share it."""
+    none, zero = np.zeros(0, int), np.zeros(0)
+    places, indices = np.zeros((0, size)), np.zeros((0, 2), int)
+    return Events(none, none, places, zero, zero, indices, np.zeros(0, bool))
+
+
+LOCATORS: Mapping[int, Callable[[Curve, Bracket], Located]] = {
+    EventCode.FOLD: locate_fold,
+    EventCode.BRANCH_POINT: locate_branch_point,
+    EventCode.CRITICAL: locate_critical,
+    EventCode.ARRIVED: partial(locate_goal, goal=1.0),
+    EventCode.RETURNED: partial(locate_goal, goal=0.0),
+}
+"""How events are located, by their kind, in the order in which they are; constraints come last."""
+
+
 def locate_all(
     curve: Curve,
     brackets: list[Bracket],
@@ -68,20 +85,12 @@ def locate_all(
     options: TraceOptions,
 ) -> Events:
     """Locate the events in all brackets that have to be located, all of a kind at once."""
-    bits = [
-        EventCode.FOLD,
-        EventCode.BRANCH_POINT,
-        EventCode.CRITICAL,
-        EventCode.ARRIVED,
-        EventCode.RETURNED,
-        EventCode.CONSTRAINT,
-    ]
-    if not options.locate_passed:
-        bits = [bit for bit in bits if bit & options.stops]
     parts, there = [], 0
     for each in brackets:
         there |= int(np.bitwise_or.reduce(each.what))
-    for bit in bits:
+    if not options.locate_passed:
+        there &= options.stops
+    for bit in (*LOCATORS, CONSTRAINT):
         bracket = _join(brackets, bit) if there & bit else None
         if bracket is None:
             continue
@@ -89,7 +98,7 @@ def locate_all(
     return Events.join(parts, curve.metric.size)
 
 
-def events_at(bracket: Bracket, code: EventCode, place: Located) -> Events:
+def events_at(bracket: Bracket, code: int, place: Located) -> Events:
     """Events of one kind at places inside steps."""
     kind, way = np.full(len(bracket.lanes), code), bracket.travelled + place.step
     index = np.stack([bracket.before.index, bracket.after.index], 1)
@@ -98,7 +107,7 @@ def events_at(bracket: Bracket, code: EventCode, place: Located) -> Events:
 
 def _join(brackets: list[Bracket], bit: int) -> Bracket | None:
     """All brackets in which `bit` happened, as one."""
-    chosen = [(bracket, np.flatnonzero(bracket.what & bit)) for bracket in brackets]
+    chosen = [(bracket, (bracket.what & bit).nonzero()[0]) for bracket in brackets]
     parts = [
         bracket if len(at) == len(bracket.what) else bracket.take(at)
         for bracket, at in chosen
@@ -113,14 +122,8 @@ def _locate(
     curve: Curve, bracket: Bracket, bit: int, constraints: tuple[Constraint, ...]
 ) -> Located:
     here = curve.take(bracket.lanes)
-    if bit == EventCode.FOLD:
-        return locate_fold(here, bracket)
-    if bit == EventCode.BRANCH_POINT:
-        return locate_branch_point(here, bracket)
-    if bit == EventCode.CRITICAL:
-        return locate_critical(here, bracket)
-    if bit in {EventCode.ARRIVED, EventCode.RETURNED}:
-        return locate_goal(here, bracket, 1.0 if bit == EventCode.ARRIVED else 0.0)
+    if bit in LOCATORS:
+        return LOCATORS[bit](here, bracket)
 
     def worst(some: Numbers, z: Lanes, t: Values) -> Values:
         z, p = here.take(some).states(z, t)

@@ -83,7 +83,7 @@ def _before_ends(curve: Curve, points: Points, outcome: Traces) -> Events:
 
     They show where the index at the end differs from that which the steps imply.
     """
-    last = np.flatnonzero(np.append(np.diff(points.lanes) != 0, True))
+    last = np.append(points.lanes[1:] != points.lanes[:-1], True).nonzero()[0]
     last = last[_regular(outcome.code[points.lanes[last]])]
     if len(last) == 0:
         return Events.join([], curve.structure.size)
@@ -133,17 +133,18 @@ def hidden_events(curve: Curve, points: Points, options: TraceOptions) -> Events
         return Events.join([], curve.structure.size)
     lanes, index, many = points.lanes, points.index, curve.take(points.lanes)
     probe = probe_at(many, fronts(many, points, np.arange(len(lanes))), points.travelled)
-    kept = np.flatnonzero(~_lowest(np.abs(probe.value), lanes, index))
+    kept = (~_lowest(np.abs(probe.value), lanes, index)).nonzero()[0]
     few, sign = probe.take(kept), np.sign(probe.value[kept])
     values, slopes = sign * few.value, sign * few.slope
     ends = values[:-1], values[1:]
-    least = least_inside(ends, (slopes[:-1], slopes[1:]), np.diff(few.length))[1]
+    length, step = few.length[1:] - few.length[:-1], kept[1:] - kept[:-1]
+    least = least_inside(ends, (slopes[:-1], slopes[1:]), length)[1]
     smaller, larger = np.minimum(*ends), np.maximum(*ends)
     # a path may start or arrive right at an event: that is no hidden one
     close = (least < CLOSE * smaller) & (smaller > AT_EVENT * larger)
-    skips = np.diff(kept) > 1
-    same = (np.diff(kept) == 1 + skips) & (np.diff(lanes[kept]) == 0)
-    at = np.flatnonzero((close | skips) & same & (np.diff(index[kept]) == 0))
+    skips, own, alike = step > 1, lanes[kept], index[kept]
+    same = (step == 1 + skips) & (own[1:] == own[:-1]) & (alike[1:] == alike[:-1])
+    at = ((close | skips) & same).nonzero()[0]
     if len(at) == 0:
         return Events.join([], curve.structure.size)
     pairs = few.take(at), few.take(at + 1)
@@ -156,7 +157,8 @@ def _lowest(value: Values, lanes: Some, index: Some) -> Flags:
 
     Both neighbours belong to the same lane and have the same index.
     """
-    alike, low = (np.diff(lanes) == 0) & (np.diff(index) == 0), np.zeros(len(value), bool)
+    alike = (lanes[1:] == lanes[:-1]) & (index[1:] == index[:-1])
+    low = np.zeros(len(value), bool)
     low[1:-1] = ~(value[1:-1] >= CLOSE * np.minimum(value[:-2], value[2:]))
     low[1:-1] &= alike[1:] & alike[:-1]
     return low
@@ -196,7 +198,7 @@ def with_multiple_points(
     `curve`, `start`: curves and unknowns at their beginning, one per lane. `outcome`: how the lanes
     ended.
     """
-    ended = np.flatnonzero((outcome.code == EventCode.LOST) | (outcome.code == EventCode.FOLD))
+    ended = ((outcome.code == EventCode.LOST) | (outcome.code == EventCode.FOLD)).nonzero()[0]
     if len(ended) == 0 or not curve.folds_change_index:
         return outcome
     code, why = outcome.code.copy(), dict(outcome.why)

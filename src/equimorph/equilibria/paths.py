@@ -33,6 +33,8 @@ JOINED = 1e-8
 """Distance in the metric within which a leg ends where the next one begins."""
 AHEAD = 1e-9
 """Part of a leg beyond the end of a lift where constraints are looked at that jump there."""
+KINDS = frozenset(EventKind)
+"""Kinds that have a member; others belong to tasks."""
 NOTHING = 1e-9
 """Value, relative to the largest on the path, that counts as zero: it may begin or end there."""
 
@@ -56,8 +58,8 @@ class Event:
     detail: str = ""
 
     def __post_init__(self) -> None:
-        """Name the kind by its member, where there is one: tasks know further ones."""
-        if self.kind in list(EventKind):
+        """Name the kind by its member, where there is one."""
+        if self.kind in KINDS:
             object.__setattr__(self, "kind", EventKind(self.kind))
 
 

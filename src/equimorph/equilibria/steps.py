@@ -124,13 +124,13 @@ class Points(Columns):
     @classmethod
     def join(cls, parts: list["Points"], size: int) -> "Points":
         """All points of some parts, sorted by lane and then by length."""
-        count = sum(len(part.t) for part in parts)
-        lanes, index, travelled, t = np.zeros(0, int), np.zeros(0, int), np.zeros(0), np.zeros(0)
-        lanes = np.concatenate([lanes, *(part.lanes for part in parts)])
-        index = np.concatenate([index, *(part.index for part in parts)])
-        travelled = np.concatenate([travelled, *(part.travelled for part in parts)])
-        t = np.concatenate([t, *(part.t for part in parts)])
-        order = np.lexsort((travelled, lanes))
+        parts = [part for part in parts if len(part.t)]
+        if not parts:
+            none, zero = np.zeros(0, int), np.zeros(0)
+            return cls(none, zero, np.zeros((0, size)), zero, none)
+        small = ((each.lanes, each.index, each.travelled, each.t) for each in parts)
+        lanes, index, travelled, t = map(np.concatenate, zip(*small, strict=True))
+        order, count = np.lexsort((travelled, lanes)), len(t)
         place = np.empty(count, int)
         place[order] = np.arange(count)
         # by far the most bytes: each part goes to its places at once

@@ -159,16 +159,15 @@ class CondensedLayout:
         ratio below `REFINABLE` (or not a number) are solved again by the pivoted dense
         factorisation.
         """
+        lanes, m = len(diagonal), border.shape[1]
         if trailing is None:
-            trailing = np.zeros((len(diagonal), border.shape[1], border.shape[1]))
-        turns, pull = (
-            (np.empty((len(diagonal), 0)), np.empty(len(diagonal))) if bent is None else bent
-        )
+            trailing = np.zeros((lanes, m, m))
+        turns, pull = (np.empty((lanes, 0)), np.empty(lanes)) if bent is None else bent
         given = (diagonal, border, columns, rows, corner, rhs, trailing, turns, pull)
         self._check(*given)
         arrays = [np.ascontiguousarray(a) for a in given]
         x, negative, ratio, determinant = self._solve(*arrays)
-        pivoted = np.zeros(len(x), bool)
+        pivoted = np.zeros(lanes, bool)
         if not ratio.min(initial=1.0) >= PIVOT_GUARD:
             doubtful = np.flatnonzero(~(ratio >= PIVOT_GUARD))
             refined = doubtful[ratio[doubtful] >= REFINABLE]
@@ -185,20 +184,20 @@ class CondensedLayout:
 
     def _check(self, *arrays: np.ndarray) -> None:
         """Refuse shapes that do not fit: the kernel does not check what it reads."""
-        lanes, m, k = len(arrays[0]), arrays[1].shape[1], arrays[2].shape[1]
-        size = self.unknown.stop - self.unknown.start + m
-        sides = arrays[5].shape[1]
+        given = [array.shape for array in arrays]
+        lanes, m, k = given[0][0], given[1][1], given[2][1]
+        size, sides = self.unknown.stop - self.unknown.start + m, given[5][1]
         nodes, columns, corner = self.nodes, (lanes, k, size), (lanes, k, k)
         bent = (lanes, nodes if len(self.coupling.weights) else 0), (lanes,)
         ends = (corner, (lanes, sides, size + k), (lanes, m, m), *bent)
-        shapes = ((lanes, nodes), (lanes, m, nodes), columns, columns, *ends)
-        if tuple(array.shape for array in arrays) == shapes:
+        shapes = [(lanes, nodes), (lanes, m, nodes), columns, columns, *ends]
+        if given == shapes:
             return
         names = ["diagonal", "border", "columns", "rows", "corner", "rhs", "trailing"]
         names += ["turns", "pull"]
-        for name, shape, array in zip(names, shapes, arrays, strict=True):
-            if array.shape != shape:
-                raise InputError(f"`{name}` must have shape {shape}; got {array.shape}.")
+        for name, shape, other in zip(names, shapes, given, strict=True):
+            if other != shape:
+                raise InputError(f"`{name}` must have shape {shape}; got {other}.")
 
     def _solve(
         self, *arrays: np.ndarray

@@ -159,8 +159,7 @@ def over_lanes(
         for array, result in zip(outputs, wide, strict=True):
             array[:] = result[:lanes]
         return
-    shares = shares_of(lanes)
-    if shares < 2:
+    if lanes < 2 * SMALLEST_SHARE or (shares := shares_of(lanes)) < 2:
         kernel(*shared, *inputs, *outputs)
         return
     cuts = [(lanes * i // shares + 7) // 8 * 8 for i in range(shares)] + [lanes]
