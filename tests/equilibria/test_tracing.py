@@ -1,5 +1,7 @@
 """The marching of many lanes."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -79,6 +81,24 @@ def test_lifts_that_locate_no_branch_points_are_lost_at_them_and_arrive_as_befor
         assert np.array_equal(located.z, refused.z)
     else:
         assert refused.t[0] * 3.0 - 1.0 == pytest.approx(0.0, abs=1e-6)
+
+
+@pytest.mark.parametrize("bound", [-0.001, -0.01, -0.1, -0.5, -2.0])
+def test_lanes_end_the_same_where_folds_on_the_way_are_not_located(bound):
+    """x² = a falling through the fold at a = 0, to a bound on x behind it or back to the start."""
+    structure = fold_form()
+    line, z = lines(structure, [[1.0]] * 3, [[1.0]] * 3, [[-1.0], [-0.1], [-0.001]])
+    within = (structure.descriptor("0") >= bound,)
+    options = TraceOptions(through_folds=True, through_branch_points=True)
+    located, plain = (
+        trace(line, z, within, replace(options, locate_folds=each)) for each in (True, False)
+    )
+    for name in ("code", "z", "t", "index", "travelled"):
+        assert np.array_equal(getattr(located, name), getattr(plain, name))
+    assert located.index.tolist() == [1, 1, 1]
+    assert located.passed.lanes.tolist() == [0, 1, 2]
+    same_step = bound > -0.1
+    assert plain.passed.lanes.tolist() == ([0, 1, 2] if same_step else [])
 
 
 def test_one_lost_lane_does_not_sink_the_batch():

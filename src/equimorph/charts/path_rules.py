@@ -332,7 +332,9 @@ class _OnPath(Rule):
 
 def _first(eset: EquilibriumSet, start: Unloaded, bound: float) -> Ends:
     """First stable states on paths."""
-    options = TraceOptions(record=False, through_folds=True, through_branch_points=True)
+    options = TraceOptions(
+        through_folds=True, through_branch_points=True, record=False, locate_folds=False
+    )
     paths = FirstStable(eset.structure, start.load, start.low, bound, eset.constraints, options)
 
     def ends(z: Lanes, begin: Parameters, goal: Parameters) -> Lanes:

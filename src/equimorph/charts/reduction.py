@@ -266,23 +266,29 @@ def _signs(preference: Preference) -> Float[np.ndarray, " V"]:
     met = used[eset.kinds[used] == VertexKind.CROSSING]
     values[met] = np.where(_preferred_beside(preference, met), -1.0, 1.0)
     used = used[eset.kinds[used] != VertexKind.CROSSING]
-    states, scored = eset.points[used], preference.choice.score is not None
-    found = preference.cells.over_vertices[1] if scored else None
-    values[used] = np.where(preference.prefers(states.z, states.p, found), -1.0, 1.0)
-    if scored:  # scores of states on folds are as good as others
+    if preference.choice.score is not None:  # those of states on folds are as good as others
+        states, found = eset.points[used], preference.cells.over_vertices[1]
+        values[used] = np.where(preference.prefers(states.z, states.p, found), -1.0, 1.0)
         return values
     folded = on_fold(eset.kinds)
-    # paths to a fold end just before it or there: look a little way off
-    doubtful = used[folded[used] & (values[used] > 0.0)]
-    fold, other = _neighbours_off_folds(corners, doubtful, folded)
-    points = preference.cells.values
+    # paths to a fold end just before it or there: look a little way off first
+    beside = _preferred_beside_folds(preference, used[folded[used]], folded)
+    values[beside] = -1.0
+    used = used[values[used] > 0.0]
+    states = eset.points[used]
+    values[used] = np.where(preference.prefers(states.z, states.p), -1.0, 1.0)
+    return values
+
+
+def _preferred_beside_folds(preference: Preference, some: Items, folded: VertexFlags) -> Items:
+    """Those of some vertices on folds whose sheets are preferred a little way off the folds."""
+    eset, points = preference.cells.eset, preference.cells.values
+    fold, other = _neighbours_off_folds(preference.cells.corners, some, folded)
     there = preference.over((1.0 - BESIDE) * points[fold] + BESIDE * points[other])
     z, structure = eset.points.z, eset.structure
     far = metric_length(structure, there.states.z - z[fold[there.point]])
     side = metric_length(structure, z[other[there.point]] - z[fold[there.point]])
-    own = far < MOVED * side
-    values[fold[there.point[own]]] = -1.0
-    return values
+    return fold[there.point[far < MOVED * side]]
 
 
 def _neighbours_off_folds(

@@ -91,7 +91,9 @@ def locate_all(
     if not options.locate_passed:
         there &= options.stops
     for bit in (*LOCATORS, CONSTRAINT):
-        bracket = _join(brackets, bit) if there & bit else None
+        # the index before an end is that behind the folds of the same step
+        others = bit if bit != EventCode.FOLD or options.locate_folds else options.stops
+        bracket = _join(brackets, bit, others) if there & bit else None
         if bracket is None:
             continue
         parts.append(events_at(bracket, bit, _locate(curve, bracket, bit, constraints)))
@@ -105,9 +107,12 @@ def events_at(bracket: Bracket, code: int, place: Located) -> Events:
     return Events(bracket.lanes, kind, place.z, place.t, way, index, place.found)
 
 
-def _join(brackets: list[Bracket], bit: int) -> Bracket | None:
-    """All brackets in which `bit` happened, as one."""
-    chosen = [(bracket, (bracket.what & bit).nonzero()[0]) for bracket in brackets]
+def _join(brackets: list[Bracket], bit: int, others: int) -> Bracket | None:
+    """All brackets in which `bit` happened, and one of `others` (maybe the same), as one."""
+    chosen = [
+        (bracket, ((bracket.what & bit != 0) & (bracket.what & others != 0)).nonzero()[0])
+        for bracket in brackets
+    ]
     parts = [
         bracket if len(at) == len(bracket.what) else bracket.take(at)
         for bracket, at in chosen

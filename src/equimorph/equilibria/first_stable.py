@@ -65,7 +65,8 @@ class FirstStable:
     within: tuple[Constraint, ...]
     """Constraints that end paths."""
     options: TraceOptions
-    """Step control; paths must go through folds and branch points."""
+    """Step control; paths must go through folds and branch points. Where they do not locate folds,
+    it is not told which of them snap."""
 
     def __call__(
         self,

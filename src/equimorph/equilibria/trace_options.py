@@ -75,6 +75,7 @@ class TraceOptions:
     first_step, largest_step, smallest_step: lengths in the metric. turning: angle between the
     tangents at both ends of a step that the step control aims at, in radians. steps: limit per
     lane. locate_passed: whether folds and branch points that do not end a lane are located.
+    locate_folds: whether such folds are, too, and not only those in its last step.
     locate_jumps: whether branch points are located in steps that change the index without a turn;
     without, steps are refused until a lane that meets one is lost: only arrivals count then.
     retries: how often lanes whose events could not be located are traced again, each time with
@@ -91,6 +92,7 @@ class TraceOptions:
     steps: int = 2000
     record: bool = True
     locate_passed: bool = True
+    locate_folds: bool = True
     locate_jumps: bool = True
     retries: int = 2
     look_inside: bool = True
