@@ -24,6 +24,10 @@ class MissingError(InputError, AttributeError):
     """
 
 
+class EndlessError(InputError):
+    """A set with states without end over a point, which constraints must bound."""
+
+
 class CancelledError(EquimorphError):
     """Raised by a progress sink to cancel a computation; lifts of many states keep what is done."""
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import equimorph as em
+from equimorph.errors import EndlessError
 from equimorph.manifold.lifting import flood
 from typecheck import unchecked
 
@@ -15,7 +16,7 @@ def test_a_set_that_winds_for_ever_is_refused(monkeypatch):
     said = (
         r"`within` must leave at most 12 equilibria over a point; got more over p = .* endless set"
     )
-    with unchecked(), pytest.raises(em.InputError, match=said):
+    with unchecked(), pytest.raises(EndlessError, match=said):
         em.equilibrium_set(winding, em.Box(p=(-2, 2)), intervals=(3,))
 
 
@@ -28,7 +29,7 @@ def winding_twice() -> em.EnergyStructure:
 def test_a_state_that_whole_turns_repeat_is_refused_early_and_by_name():
     """Six copies are enough where more turns violate no constraint."""
     said = r"`within` must bound whole turns: over p = .* 6 times, and without end"
-    with unchecked(), pytest.raises(em.InputError, match=said):
+    with unchecked(), pytest.raises(EndlessError, match=said):
         em.equilibrium_set(winding_twice(), em.Box(p=(-2, 2)), intervals=(3,))
 
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from equimorph.arrays import Flags, Items, Lanes, Numbers, Values
 from equimorph.columns import Columns
-from equimorph.errors import InputError
+from equimorph.errors import EndlessError
 from equimorph.linalg.lanes import over_lanes
 from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.lifting.edges import LONGEST, Excess, correct_ends, trace_rays
@@ -89,7 +89,7 @@ def flood_directly(pairing: Pairing, progress: Progress) -> None:
 
 
 def _refuse_endless(pairing: Pairing) -> None:
-    """Raise InputError if a set grows without end, like one that winds around a circle."""
+    """Raise EndlessError if a set grows without end, like one that winds around a circle."""
     store, setting = pairing.points, pairing.setting
     vertex = store.vertex[: store.count]
     sheets = np.bincount(vertex[vertex >= 0], minlength=1)
@@ -99,13 +99,13 @@ def _refuse_endless(pairing: Pairing) -> None:
     names = [setting.structure.parameters[place].name for place in setting.free]
     point = ", ".join(f"{name} = {value:g}" for name, value in zip(names, p, strict=True))
     if _repeats(pairing, np.flatnonzero(vertex == sheets.argmax())):
-        raise InputError(
+        raise EndlessError(
             f"`within` must bound whole turns: over {point} they repeat a state {REPEATED} times, "
             "and without end. Bound a descriptor that grows with them: an angle, or the rotation "
             "of a member that is hinged at both ends."
         )
     if sheets.max() > ENDLESS:
-        raise InputError(
+        raise EndlessError(
             f"`within` must leave at most {ENDLESS} equilibria over a point; got more over "
             f"{point}. Bound a descriptor: one that grows with the turns of an endless set, "
             "or displacements if the structure has that many states."

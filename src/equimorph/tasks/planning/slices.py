@@ -15,7 +15,7 @@ from itertools import combinations, pairwise
 import numpy as np
 
 from equimorph.arrays import Pairs
-from equimorph.errors import InputError
+from equimorph.errors import EndlessError
 from equimorph.linalg.graphs import components, shortest_path
 from equimorph.manifold import EquilibriumSet, equilibrium_set
 from equimorph.manifold.queries.locate import pieces_of
@@ -84,7 +84,7 @@ class Slices:
     def _add(self, names: tuple[str, ...], base: int) -> bool:
         """Compute the slice through a station, join it to the others; whether it is a new one.
 
-        Nor is there one where the set is refused: constraints need not bound it.
+        Nor is there one where constraints do not bound it: lifts alone may still lead there.
         """
         state, number = self.stations[base], len(self.sets)
         like = [k for k, each in enumerate(self.sets) if each.names == names]
@@ -96,7 +96,7 @@ class Slices:
             eset = equilibrium_set(
                 self.structure, box, fixed=fixed, within=self.within, intervals=INTERVALS
             )
-        except InputError:  # states without end over a point: lifts alone may still lead there
+        except EndlessError:
             return False
         self.sets.append(eset)
         for station in range(len(self.stations)):
