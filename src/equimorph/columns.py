@@ -25,9 +25,15 @@ class Columns:
         self: Record, rows: Int[np.ndarray, " some"] | Bool[np.ndarray, " all"] | slice
     ) -> Record:
         """Return a selection of the rows, by numbers, flags or a slice."""
+        if isinstance(rows, np.ndarray) and rows.dtype == bool:
+            rows = rows.nonzero()[0]
+        numbers = not isinstance(rows, slice)
         return type(self)(
             *[
-                field[rows] if isinstance(field, np.ndarray) else _selection(field, rows)
+                # by numbers, `take` costs a fifth of brackets where rows are short
+                field.take(rows, axis=0)
+                if numbers and isinstance(field, np.ndarray)
+                else _selection(field, rows)
                 for field in self._fields
             ]
         )
@@ -63,6 +69,8 @@ def _reader(kind: type[Columns]) -> Callable[[Any], tuple[Any, ...]]:
 
 
 def _selection(field: Any, rows: Any) -> Any:
+    if isinstance(field, np.ndarray):
+        return field[rows]
     return field.take(rows) if hasattr(field, "take") else field
 
 

@@ -19,8 +19,9 @@ from equimorph.manifold.lifting.kernels import (
     square_gaps,
 )
 from equimorph.manifold.lifting.loops import find_loops
-from equimorph.manifold.lifting.pairing import Pairing, Rays, start_pairing
+from equimorph.manifold.lifting.pairing import Pairing, RayMark, Rays, start_pairing
 from equimorph.manifold.lifting.patterns import Whole
+from equimorph.manifold.lifting.ray_kernels import enter_rays, rays_marked
 from equimorph.manifold.lifting.seeds import seeds
 from equimorph.model import Silent, parameter_vector
 
@@ -274,3 +275,54 @@ def test_vertices_on_edges_are_looked_for_near_the_surface():
         )
         assert not found.any()
     assert errors[1] < 0.1 * errors[0] < 1e-4
+
+
+def marked(pairing: Pairing) -> np.ndarray:
+    """Rays of a pairing, a third of them with marks instead of curves."""
+    generator, rays = np.random.default_rng(3), pairing.rays.copy()
+    some = generator.random(rays.shape) < 1 / 3
+    rays[some] = generator.choice(np.array(list(RayMark)), int(some.sum()))
+    return rays
+
+
+def test_rays_with_a_mark_are_those_of_a_plain_search(lifted):
+    """In order, each edge from its first end if any ray there has the mark."""
+    rays, (points, mesh) = marked(lifted), (lifted.points, lifted.mesh)
+    plain = []
+    for point in np.flatnonzero(points.vertex[: points.count] >= 0).tolist():
+        for slot, edge in enumerate(lifted.incident[points.vertex[point]].tolist()):
+            if edge >= 0 and rays[point, slot] == RayMark.HARD:
+                plain.append((point, edge, int(mesh.edges[edge, 1] == points.vertex[point])))
+    first = {edge for _, edge, side in plain if side == 0}
+    plain = [each for each in plain if each[2] == 0 or each[1] not in first]
+    given = int(RayMark.HARD), points.count, points.vertex, rays, lifted.incident, mesh.edges
+    assert list(zip(*(each.tolist() for each in rays_marked(*given)), strict=True)) == plain
+    assert len(plain) > 100
+
+
+def test_curves_are_entered_where_nothing_is_known_and_nothing_else_claims(lifted):
+    """As counting says how often each ray is claimed; other rays keep what they had."""
+    curves, mesh, vertex = lifted.curves, lifted.mesh, lifted.points.vertex
+    generator, before = np.random.default_rng(4), marked(lifted)
+    own = generator.choice(np.flatnonzero(curves.plain), 400)  # some of them twice
+    start, end, edges = (each[own] for each in (curves.start, curves.end, curves.edge))
+    sides = (mesh.edges[edges, 1] == vertex[start]).astype(int)
+
+    def claims(k: int) -> list[tuple[int, int]]:
+        ends = [int(each[k]) for each in (start, end) if each[k] >= 0]
+        return [
+            (at, int(lifted.slots[edges[k], int(mesh.edges[edges[k], 1] == vertex[at])]))
+            for at in ends
+        ]
+
+    every = [claim for k in range(len(own)) for claim in claims(k)]
+    rays, number, plain, expected = before.copy(), 10_000, [], before.copy()
+    for k in range(len(own)):
+        free = all(before[claim] < 0 and every.count(claim) == 1 for claim in claims(k))
+        plain.append(number + sum(each >= 0 for each in plain) if free else -1)
+        for claim in claims(k) if free else ():
+            expected[claim] = plain[-1]
+    given = start, edges, sides, end, vertex, mesh.edges, lifted.slots, rays, number
+    assert enter_rays(*given).tolist() == plain
+    np.testing.assert_array_equal(rays, expected)
+    assert 20 < sum(each >= 0 for each in plain) < len(own)

@@ -30,7 +30,7 @@ def in_units(
     determinants: Float[np.ndarray, "... 2"], exponent: Float[np.ndarray, "..."] | float
 ) -> Float[np.ndarray, "..."]:
     """Determinants over powers of two with these exponents."""
-    power = np.clip(determinants[..., 1] - exponent, -POWERS, POWERS).astype(np.int64)
+    power = np.maximum(np.minimum(determinants[..., 1] - exponent, POWERS), -POWERS).astype(int)
     with np.errstate(over="ignore", under="ignore"):
         return np.asarray(np.ldexp(determinants[..., 0], power))
 

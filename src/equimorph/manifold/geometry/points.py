@@ -99,9 +99,10 @@ class Points:
             vertices, np.ascontiguousarray(z), self.structure.mass, SAME_STATE, self.head,
             self.following, self.z, self.count, ids, new,
         )  # fmt: skip
-        at = ids[new]
-        self.p[at], self.index[at], self.kind[at] = p[new], index[new], GRID
-        self.vertex[at], self.edge[at] = vertices[new], -1
+        own = np.flatnonzero(new)
+        at = ids[own]
+        self.p[at], self.index[at], self.kind[at] = p.take(own, axis=0), index[own], GRID
+        self.vertex[at], self.edge[at] = vertices[own], -1
         return ids, new
 
     def add(

@@ -1,6 +1,7 @@
 """What is lifted: the structure, its free parameters and constraints; and its metric."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -23,10 +24,11 @@ class Setting:
         """All parameters over points of the box."""
         p = np.empty((len(points), len(self.base)))
         p[:] = self.base
-        p[:, self.free] = points
+        for k, place in enumerate(self.free.tolist()):
+            p[:, place] = points[:, k]
         return p
 
-    @property
+    @cached_property
     def scales(self) -> Place:
         """Scales of the free parameters."""
         return np.asarray(self.structure.scales[self.free])

@@ -40,13 +40,12 @@ class Curves:
         self.put_inside(number, inner)
         return number
 
-    def extend(self, edges: Items, starts: Items, ends: Items) -> Items:
-        """Add curves without inner points; return their numbers."""
+    def extend(self, edges: Items, starts: Items, ends: Items) -> None:
+        """Add curves without inner points."""
         known, self.count = self.count, self.count + len(edges)
         self._make_room(self.count)
         for own, column in zip(self._columns, (edges, starts, ends, 0), strict=True):
             own[known : self.count] = column
-        return np.arange(known, self.count)
 
     def put_inside(self, curve: int, inner: list[int]) -> None:
         """Enter the inner points of a curve, if it has any."""

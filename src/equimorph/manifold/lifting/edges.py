@@ -60,7 +60,7 @@ def correct_ends(
     own = np.flatnonzero(good)
     excess = np.full((len(good), len(constraints)), np.nan)
     for k, constraint in enumerate(constraints):
-        excess[own, k] = constraint.excess(end.z[own], p[own])
+        excess[own, k] = constraint.excess(end.z.take(own, axis=0), p.take(own, axis=0))
         own = own[excess[own, k] <= 0.0]
     good[:] = False
     good[own] = True

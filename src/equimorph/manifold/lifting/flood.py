@@ -120,6 +120,8 @@ def _repeats(pairing: Pairing, points: Items) -> bool:
     """
     structure, constraints = pairing.setting.structure, pairing.setting.constraints
     z, p = pairing.points.z[points], pairing.points.p[points]
+    if not np.ptp(z[:, : structure.unknowns], axis=0).max() > (REPEATED - 2) * TURN:
+        return False
     for own in range(len(z)):
         apart = z - z[own]
         turned = np.rint(apart / TURN)
@@ -165,12 +167,15 @@ def _lift_to_new_ends(pairing: Pairing, rays: Rays, ends: Ends) -> None:
     tangent, index = ends.guesses - store.z[rays.points], store.index[rays.points]
     constraints = pairing.setting.constraints
     z, good, excess = correct_ends(line, ends.guesses, tangent, ends.lengths, index, constraints)
-    _enter_lifted(pairing, rays.take(good), z[good], excess[good])
+    good = np.flatnonzero(good)
+    _enter_lifted(pairing, rays.take(good), z.take(good, axis=0), excess.take(good, axis=0))
 
 
 def _without_difficult(pairing: Pairing, rays: Rays) -> Rays:
     """Rays on edges that need no more effort; the others are marked as hard."""
     difficult = pairing.effort[rays.edges] > 0
+    if not difficult.any():
+        return rays
     pairing.mark(rays.take(difficult), RayMark.HARD)
     return rays.take(~difficult)
 
@@ -185,7 +190,8 @@ def _enter_lifted(pairing: Pairing, done: Rays, z: Lanes, excess: Excess) -> Non
     pairing.fit()
     # it was counted a correction before the last one; where eigenvalues nearly vanish it may differ
     pairing.slopes.fit(setting, store)
-    pairing.slopes.excess[ids[new]] = excess[new]
+    new = np.flatnonzero(new)
+    pairing.slopes.excess[ids[new]] = excess.take(new, axis=0)
     counted = pairing.slopes.index[ids]
     same = np.flatnonzero(counted == store.index[done.points])
     store.index[ids[new]] = counted[new]

@@ -19,6 +19,7 @@ from equimorph.manifold.complex.base_mesh import BaseMesh
 from equimorph.manifold.geometry.points import Points, VertexKind
 from equimorph.manifold.geometry.setting import Setting
 from equimorph.manifold.lifting.curves import Curves
+from equimorph.manifold.lifting.ray_kernels import enter_rays, rays_marked
 from equimorph.structures.metric import metric_length
 from equimorph.tolerances import SAME_STATE
 
@@ -65,7 +66,7 @@ class Slopes:
         self.count = points.count
         if len(new) == 0:
             return
-        z, p = points.z[new], points.p[new]
+        z, p = points.z.take(new, axis=0), points.p.take(new, axis=0)
         directions = np.zeros((len(new), len(setting.free), p.shape[1]))
         directions[:, np.arange(len(setting.free)), setting.free] = 1.0
         out = setting.structure.respond(z, p, directions)
@@ -74,8 +75,8 @@ class Slopes:
         self.tangents[new], self.index[new] = out.tangents, out.index
         self.determinant[new] = in_units(out.determinant, self.unit)
         largest = np.abs(out.dz).max(axis=1)
-        near = (largest > LAST[0]) & (largest < LAST[1])
-        points.z[new[near]] += out.dz[near]
+        near = np.flatnonzero((largest > LAST[0]) & (largest < LAST[1]))
+        points.z[new[near]] = z.take(near, axis=0) + out.dz.take(near, axis=0)
 
     def _reserve(self, capacity: int) -> None:
         """Make room for as many points as there may be."""
@@ -209,15 +210,11 @@ class Pairing:
 
     def rays_with(self, mark: RayMark) -> Rays:
         """Rays with a certain mark: each edge from one end, so that no curve is traced twice."""
-        count = self.points.count
-        vertex = self.points.vertex[:count]
-        points, slots = np.divmod(np.flatnonzero(self.rays[:count] == mark), self.rays.shape[1])
-        edges = np.where(vertex[points] >= 0, self.incident[vertex[points], slots], -1)
-        points, edges = points[edges >= 0], edges[edges >= 0]
-        sides = (self.mesh.edges[edges, 1] == vertex[points]).astype(int)
-        from_first = np.zeros(len(self.mesh.edges), bool)
-        from_first[edges[sides == 0]] = True
-        return Rays(points, edges, sides).take((sides == 0) | ~from_first[edges])
+        found = rays_marked(
+            int(mark), self.points.count, self.points.vertex, self.rays, self.incident,
+            self.mesh.edges,
+        )  # fmt: skip
+        return Rays(*found)
 
     def enter(
         self, point: int, edge: int, end: int, inner: Sequence[int] = (), tried: int = 0
@@ -258,28 +255,19 @@ class Pairing:
         Left over are those that start or end with rays that have curves, or that others start or
         end with, too. Curves that leave through a constraint have −1 as their ends.
         """
-        width, table = self.rays.shape[1], self.rays.ravel()
-        near = rays.points * width + self.slots[rays.edges, rays.sides]
-        arrived = ends >= 0
-        there, edges = ends[arrived], rays.edges[arrived]
-        sides = (self.mesh.edges[edges, 1] == self.points.vertex[there]).astype(int)
-        far = there * width + self.slots[edges, sides]
-        keys = np.concatenate([near, far])
-        number, met = np.arange(len(keys)), np.empty(len(table), int)
-        met[keys] = number
-        met[keys[met[keys] != number]] = -1  # those that were overwritten
-        free = (met[keys] == number) & (table[keys] < 0)
-        new = free[: len(near)]
-        new[arrived] &= free[len(near) :]
-        numbers = np.full(len(ends), -1)
-        numbers[new] = own = self.curves.extend(rays.edges[new], rays.points[new], ends[new])
-        table[near[new]] = own
-        table[far[new[arrived]]] = numbers[new & arrived]
+        numbers = enter_rays(
+            rays.points, rays.edges, rays.sides, ends, self.points.vertex, self.mesh.edges,
+            self.slots, self.rays, self.curves.count,
+        )  # fmt: skip
+        new = np.flatnonzero(numbers >= 0)
+        self.curves.extend(rays.edges[new], rays.points[new], ends[new])
         return numbers
 
     def enter_many(self, rays: Rays, ends: Items) -> None:
         """Register curves without inner points: at once where nothing is known, else singly."""
         left = np.flatnonzero(self.enter_at_once(rays, ends) < 0)
+        if len(left) == 0:
+            return
         rest = rays.take(left)
         for point, edge, end in zip(
             rest.points.tolist(), rest.edges.tolist(), ends[left].tolist(), strict=True
