@@ -114,8 +114,7 @@ def alternatives(
         paths, rough = classes.paths(count)
         most = np.sort(rough)[:count].max(initial=0.0)
         paths = [each for each, cost in zip(paths, rough, strict=True) if cost <= UNSURE * most]
-        corners = straight_corners(eset, paths, tightened, same_class=True)
-        corners = sorted(corners, key=lambda each: chain_cost(each, tightened))[:count]
+        corners = straight_corners(eset, paths, tightened, best=count)
         chains = [follow_direction(each, ends) for each in corners]
         routes = routes_over_corners(eset, chains, demands, monitor)
         least = min((route.cost for route in routes if route.arrived), default=np.inf)

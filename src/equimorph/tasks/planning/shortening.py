@@ -97,6 +97,12 @@ class Shortener:
             return best, self._steps.states(found[best])
         return best, self.curves_near([paths[best]])[0]
 
+    def shortest(self, curves: Sequence[States | None], count: int) -> list[int]:
+        """Which curves are among the shortest, and those that were not found."""
+        lengths = [np.inf if each is None else float(self._gaps(each).sum()) for each in curves]
+        longest = max(sorted(lengths)[:count], default=np.inf)
+        return [k for k, each in enumerate(curves) if each is None or lengths[k] <= longest]
+
     def _curves_along(self, paths: Sequence[States], count: int) -> dict[int, Curves]:
         """Curves along paths, of about so many nodes each.
 

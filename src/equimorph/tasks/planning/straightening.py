@@ -298,11 +298,21 @@ def way_points_of(eset: EquilibriumSet, corners: States) -> Corners:
 
 
 def straight_corners(
-    eset: EquilibriumSet, paths: Sequence[States], demands: Demands, same_class: bool = False
+    eset: EquilibriumSet, paths: Sequence[States], demands: Demands, best: int | None = None
 ) -> list[States]:
-    """Corners of straightened paths, both ends of each among them."""
-    curves = Shortener(eset, _closely(paths, demands)).curves_near(paths)
-    return _cheapest_corners(eset, paths, curves, demands, same_class)
+    """Corners of straightened paths, both ends of each among them.
+
+    `best`: only those of so many paths, the cheapest first, each straightened within its class.
+    """
+    shortener = Shortener(eset, _closely(paths, demands))
+    curves = shortener.curves_near(paths)
+    if best is not None and demands.objective.is_length:
+        some = shortener.shortest(curves, best)
+        paths, curves = [paths[k] for k in some], [curves[k] for k in some]
+    corners = _cheapest_corners(eset, paths, curves, demands, same_class=best is not None)
+    if best is None:
+        return corners
+    return sorted(corners, key=lambda each: chain_cost(each, demands))[:best]
 
 
 def best_corners(eset: EquilibriumSet, paths: Sequence[States], demands: Demands) -> States:
