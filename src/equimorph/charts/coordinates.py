@@ -61,7 +61,7 @@ def solve_over_parameters(
     `tried`: numbers of the lanes for which it is tried.
     """
     setting, structure = scalars.setting, scalars.setting.structure
-    given, asked = scalars.places >= 0, np.flatnonzero(scalars.places < 0)
+    given, asked = scalars.places >= 0, (scalars.places < 0).nonzero()[0]
     unknown = np.array([k for k in setting.free.tolist() if k not in scalars.places.tolist()], int)
     z, p, wanted = z[tried], p[tried], wanted[tried]
     p[:, scalars.places[given]] = wanted[:, given]
@@ -150,14 +150,15 @@ class Coordinates(Scalars):
         folded
             Lanes next to folds.
         """
-        quick = solve_over_parameters(self, z, p, wanted, regular := np.flatnonzero(~folded))
+        regular = (~folded).nonzero()[0]
+        quick = solve_over_parameters(self, z, p, wanted, regular)
         z, p, good = z.copy(), p.copy(), np.zeros(len(wanted), bool)
         index = np.full(len(wanted), -1)
-        own = regular[quick.found]
-        z[own], p[own], index[own], good[own] = (
-            column[quick.found] for column in (quick.z, quick.p, quick.index, quick.found)
-        )
-        rest = np.flatnonzero(~good)
+        some = quick.found.nonzero()[0]
+        own = regular[some]
+        z[own], p[own], index[own] = quick.z[some], quick.p[some], quick.index[some]
+        good[own] = True
+        rest = (~good).nonzero()[0]
         if len(rest) == 0:
             return z, p, good, index
         slow = solve_on_the_set(self, z[rest], p[rest], wanted[rest], planes(rest))

@@ -226,7 +226,7 @@ class Cells:
         z, p, good = self._polish(*self._guess(hits), hits, points[hits.point])
         again = self._doubtful(hits, good, len(points))
         z, p, good = self._again(hits, z, p, good, again, points)
-        kept = np.flatnonzero(good)
+        kept = good.nonzero()[0]
         kept = kept[self.one_of_each(z[kept], p[kept], hits.take(kept))]
         hits = hits.take(kept)
         return z[kept], p[kept], first + hits.point, self.numbers[hits.cell], hits.inside
@@ -251,7 +251,7 @@ class Cells:
             guess_z, guess_p, wanted, lambda lanes: self.planes(hits.cell[lanes]), folded
         )
         setting = self.coordinates.setting
-        some = np.flatnonzero(good)
+        some = good.nonzero()[0]
         moved = np.linalg.norm(
             embed(setting, z[some], p[some]) - embed(setting, guess_z[some], guess_p[some]),
             axis=1,
@@ -309,7 +309,7 @@ class Cells:
         """Failed hits of cells that contain the point, or of points without a state."""
         states = np.bincount(hits.point[good], minlength=count)
         wanted = np.bincount(hits.point[hits.inside], minlength=count)
-        return np.flatnonzero(~good & (states < np.maximum(wanted, 1))[hits.point])
+        return (~good & (states < np.maximum(wanted, 1))[hits.point]).nonzero()[0]
 
     def _again(
         self, hits: Hits, z: Lanes, p: Parameters, good: Flags, again: Items, points: Points

@@ -233,10 +233,10 @@ class SingularPairs:
         scaled, starts = points / self.cells.ranges, min(STARTS, len(self.vertices))
         rows, whole = self._singular(self._tree.query(scaled, k=np.arange(1, starts + 1))[1])
         gap = np.full(rows.shape, np.inf)
-        some = np.nonzero(rows >= 0)
+        some = (rows >= 0).nonzero()
         gap[some] = np.linalg.norm(scaled[some[0]] - whole.values[rows[some]], axis=1)
-        chosen = np.argsort(gap, axis=1, kind="stable")[:, :NEIGHBOURS]
-        point, place = np.nonzero(np.isfinite(np.take_along_axis(gap, chosen, axis=1)))
+        chosen = gap.argsort(axis=1, kind="stable")[:, :NEIGHBOURS]
+        point, place = np.isfinite(gap[np.arange(len(points))[:, None], chosen]).nonzero()
         row = rows[point, chosen[point, place]]
         rest = scaled[point] - whole.values[row]
         along, null = np.einsum("nji,ni->nj", whole.slope[row], rest), whole.null[row]
@@ -252,7 +252,7 @@ class SingularPairs:
         steps = [along + (middle + sign * half)[:, None] * null for sign in (1.0, -1.0)]
         good = np.max([np.linalg.norm(step, axis=1) for step in steps], axis=0) <= self._longest
         both = np.concatenate([step[good] for step in steps])
-        own = np.tile(np.flatnonzero(good), 2)
+        own = np.tile(good.nonzero()[0], 2)
         return point[own], whole.take(row[own]), both
 
 

@@ -11,7 +11,7 @@ from equimorph.arrays import Float, Items, Lanes, Parameters, Points, Rows
 from equimorph.charts.coordinates import Coordinates, solve_on_the_set
 from equimorph.charts.location import Cells, Found
 from equimorph.charts.singular_pairs import unite
-from equimorph.manifold.geometry.tangents import bend_along, split_step, tangent_frames
+from equimorph.manifold.geometry.tangents import InPlanes, split_step
 from equimorph.structures import States
 
 STEP = 0.02
@@ -30,7 +30,7 @@ def add_twins(cells: Cells, found: Found, points: Points) -> Found:
     if len(of) == 0:
         return found
     own = solve_on_the_set(cells.coordinates, z, p, points[found.point[of]], rows[of])
-    some = np.flatnonzero(own.found)
+    some = own.found.nonzero()[0]
     states, of = States(cells.eset.structure, own.z[some], own.p[some]), of[some]
     cell = cells.nearest(states)
     good = np.flatnonzero(cells.hold(states, own.index[some], cell))
@@ -48,22 +48,23 @@ def _guesses(
 ) -> tuple[Float[np.ndarray, "n size"], Float[np.ndarray, "n parameters"], Items]:
     """Guesses of the twins that are near enough, and the number of the state of each."""
     setting = coordinates.setting
-    frames = tangent_frames(setting, z, p, rows)
+    here = InPlanes(setting, z, p, rows)
+    frames = here.frames
     slopes = coordinates.derivative(z, p, frames) / ranges[:, None]
     left, sizes, right = np.linalg.svd(slopes)
     steps = np.einsum("lk,lkf->lf", right[:, -1], frames)
     dz, dp = split_step(setting, steps)
-    bent = split_step(setting, bend_along(setting, z, p, rows, steps))
+    bent = split_step(setting, here.bend_along(steps))
     # both sides at once: single states cost calls, not arithmetic
     every = (
         np.concatenate([here, here - STEP * d + half, here + STEP * d + half])
         for here, d, half in ((z, dz, 0.5 * STEP**2 * bent[0]), (p, dp, 0.5 * STEP**2 * bent[1]))
     )
-    here, below, above = np.split(coordinates(*every) / ranges, 3)
+    here, below, above = (coordinates(*every) / ranges).reshape(3, *slopes.shape[:2])
     second = (below - 2.0 * here + above) / STEP**2
     bend = np.einsum("lm,lm->l", left[:, :, -1], second)
     with np.errstate(divide="ignore", invalid="ignore"):
         t = -2.0 * sizes[:, -1] / bend
-    near = np.flatnonzero(np.abs(t) < FARTHEST)
+    near = (np.abs(t) < FARTHEST).nonzero()[0]
     move = t[near, None]
     return z[near] + move * dz[near], p[near] + move * dp[near], near

@@ -160,7 +160,7 @@ class Settled:
     @property
     def found(self) -> Flags:
         """Which lanes ended at a point that is believed."""
-        return np.asarray(self.status == Status.FOUND)
+        return np.asarray(self.status == FOUND)
 
 
 def settle(
@@ -293,7 +293,7 @@ class _Run:
 
     def record(self, here: Points, step: Step, status: Numbers) -> Some:
         """Note where the lanes are that ended, and what is known there; which lanes go on."""
-        left = np.flatnonzero(status == OPEN)
+        left = (status == OPEN).nonzero()[0]
         if len(left) == len(status):
             return left
         some = np.flatnonzero(status != OPEN) if len(left) else slice(None)

@@ -5,6 +5,7 @@ n log n, not n².
 """
 
 from bisect import bisect_left, bisect_right, insort
+from functools import lru_cache
 
 import numpy as np
 
@@ -23,8 +24,7 @@ def firsts_apart(places: Places, tolerance: float, known: int = 0) -> Int[np.nda
 
     The first `known` are taken to be different.
     """
-    along = np.random.default_rng(0).normal(size=places.shape[1])
-    position = places @ (along / np.linalg.norm(along))
+    position = places @ _line(places.shape[1])
     reach = tolerance + ROOM * float(np.abs(places).max(initial=0.0))
     fresh = np.arange(known, len(places))
     if known:
@@ -39,6 +39,13 @@ def firsts_apart(places: Places, tolerance: float, known: int = 0) -> Int[np.nda
         insort(line, (there, k))
         kept.append(k)
     return np.array(kept, dtype=int)
+
+
+@lru_cache(maxsize=64)
+def _line(width: int) -> Float[np.ndarray, " coordinates"]:
+    """Direction of the line on which points are projected."""
+    along = np.random.default_rng(0).normal(size=width)
+    return np.asarray(along / np.linalg.norm(along))
 
 
 def _beside_known(

@@ -235,8 +235,11 @@ def join_states(structure: Structure, parts: Iterable[Points]) -> States:
         Any number of them, also none.
     """
     given = list(parts)
-    z = [np.zeros((0, structure.size)), *(np.atleast_2d(each.z) for each in given)]
-    p = [np.zeros((0, len(structure.parameters))), *(np.atleast_2d(each.p) for each in given)]
+    z, p = [np.zeros((0, structure.size))], [np.zeros((0, len(structure.parameters)))]
+    for each in given:
+        alone = each.z.ndim == 1
+        z.append(each.z[None] if alone else each.z)
+        p.append(each.p[None] if alone else each.p)
     states = States(structure, np.concatenate(z), np.concatenate(p))
     if given and all("index" in vars(each) for each in given):
         vars(states)["index"] = np.concatenate([vars(each)["index"] for each in given])

@@ -1,6 +1,7 @@
 """Tangent spaces of the set at its vertices, folds to second order, and how far edges are off."""
 
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import combinations
 
 import numpy as np
@@ -23,10 +24,11 @@ from equimorph.columns import Columns
 from equimorph.equilibria.critical import Critical, null_border
 from equimorph.equilibria.newton_step import free_directions, weights_of
 from equimorph.equilibria.point_conditions import second_derivatives
-from equimorph.linalg import orthonormal_rows
+from equimorph.linalg import Border, orthonormal_rows
 from equimorph.manifold.geometry.setting import Setting, embed
 from equimorph.manifold.geometry.simplices import squared_sides
 from equimorph.model import worst_excess
+from equimorph.structures import LinearSystem
 from equimorph.structures.metric import metric_coordinates, products_with
 from equimorph.tolerances import METRIC_DIFFERENCE
 
@@ -44,41 +46,54 @@ def tangent_frames(setting: Setting, z: Lanes, p: Parameters, rows: Rows) -> Fra
     ``[F_z F_p; R] t_i = (0, e_i)`` with rows R of the embedding that span nearby spaces, whose
     orientation the bases take over.
     """
-    structure, (lanes, size), d = setting.structure, z.shape, len(setting.free)
-    frames = np.empty((lanes, d, size + d))
-    for at in range(0, lanes, CHUNK):
+    frames = np.empty((*rows.shape[:2], z.shape[1] + rows.shape[1]))
+    for at in range(0, len(z), CHUNK):
         own = slice(at, at + CHUNK)
-        rhs = np.zeros((len(z[own]), d, size + d))
+        frames[own] = InPlanes(setting, z[own], p[own], rows[own]).frames
+    return frames
+
+
+@dataclass(frozen=True)
+class InPlanes:
+    """Points of the set, with rows of the embedding that span spaces near the tangent spaces."""
+
+    setting: Setting
+    z: Lanes
+    p: Parameters
+    rows: Rows
+
+    @cached_property
+    def _solver(self) -> tuple[LinearSystem, Border]:
+        """F_z and F_p at the points, bordered by the rows."""
+        structure, free = self.setting.structure, self.setting.free
+        directions = free_directions(structure, free, len(self.z))
+        system = structure.linear_system(self.z, self.p, directions)
+        by_z = products_with(structure, self.rows)
+        return system, (system.columns, by_z, self.rows[:, :, structure.unknowns :])
+
+    def _solve(
+        self, rhs: Float[np.ndarray, "lanes sides full"]
+    ) -> Float[np.ndarray, "lanes sides full"]:
+        system, border = self._solver
+        return system.solve(rhs, border).x
+
+    @property
+    def frames(self) -> Frames:
+        """Orthonormal bases of the tangent spaces, as `tangent_frames`."""
+        (lanes, size), d = self.z.shape, len(self.setting.free)
+        rhs = np.zeros((lanes, d, size + d))
         rhs[:, :, size:] = np.eye(d)
-        frames[own] = _solve_in_planes(setting, z[own], p[own], rows[own], rhs)
-    return orthonormal_rows(frames, d, weights_of(structure, size + d))
+        return orthonormal_rows(self._solve(rhs), d, weights_of(self.setting.structure, size + d))
 
+    def bend_along(self, step: Float[np.ndarray, "lanes full"]) -> Float[np.ndarray, "lanes full"]:
+        """Second derivative, orthogonal to the rows, of the set along tangents.
 
-def bend_along(
-    setting: Setting, z: Lanes, p: Parameters, rows: Rows, step: Float[np.ndarray, "lanes full"]
-) -> Float[np.ndarray, "lanes full"]:
-    """Second derivative, orthogonal to rows that span nearby spaces, of the set along tangents.
-
-    ``[F_z F_p; R] b = (−D²F[t, t], 0)``: to second order the set is at ``z + h t + h² b/2``.
-    """
-    along = split_step(setting, step)
-    rhs = np.zeros((len(z), 1, step.shape[1]))
-    rhs[:, 0, : z.shape[1]] = -setting.structure.second_derivative(z, p, along, along)
-    return _solve_in_planes(setting, z, p, rows, rhs)[:, 0]
-
-
-def _solve_in_planes(
-    setting: Setting,
-    z: Lanes,
-    p: Parameters,
-    rows: Rows,
-    rhs: Float[np.ndarray, "lanes sides full"],
-) -> Float[np.ndarray, "lanes sides full"]:
-    """Solve with F_z and F_p at points, bordered by rows of the embedding."""
-    structure = setting.structure
-    system = structure.linear_system(z, p, free_directions(structure, setting.free, len(z)))
-    by_z = products_with(structure, rows)
-    return system.solve(rhs, (system.columns, by_z, rows[:, :, structure.unknowns :])).x
+        ``[F_z F_p; R] b = (−D²F[t, t], 0)``: to second order the set is at ``z + h t + h² b/2``.
+        """
+        along, rhs = split_step(self.setting, step), np.zeros((len(step), 1, step.shape[1]))
+        twice = self.setting.structure.second_derivative(self.z, self.p, along, along)
+        np.negative(twice, out=rhs[:, 0, : self.z.shape[1]])
+        return self._solve(rhs)[:, 0]
 
 
 def frames_in_embedding(setting: Setting, frames: Frames) -> Rows:

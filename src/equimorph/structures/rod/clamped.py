@@ -240,7 +240,7 @@ class ClampedMechanics(PlanarMechanics):
         z, p = self.check_widths((z, p))
         given = z, p, np.zeros_like(p), row, corner, defect, *force
         out, ratio = self.fused_step(advance_under_lanes, self._step_data, *given)
-        unsafe = np.flatnonzero(~(ratio >= PIVOT_GUARD))
+        unsafe = (~(ratio >= PIVOT_GUARD)).nonzero()[0]
         if len(unsafe):
             some = (each[unsafe] for each in (z, p, row, corner, defect))
             again = super().advance_under((force[0][unsafe], force[1][unsafe]), *some)
@@ -262,7 +262,7 @@ class ClampedMechanics(PlanarMechanics):
         if directions.shape[1] > MOST:
             return super().respond(z, p, directions)
         out = self._fused_response(z, p, directions)
-        unsafe = np.flatnonzero(~(out.ratio >= PIVOT_GUARD))
+        unsafe = (~(out.ratio >= PIVOT_GUARD)).nonzero()[0]
         if len(unsafe):
             again = super().respond(z[unsafe], p[unsafe], directions[unsafe])
             for name, column in vars(again).items():
@@ -272,7 +272,7 @@ class ClampedMechanics(PlanarMechanics):
     def index(self, z: Lanes, p: Parameters) -> Int[np.ndarray, " lanes"]:
         """Negative eigenvalues of the constrained Hessian, as the fused kernel counts them."""
         out = self._fused_response(z, p, np.zeros((len(z), 0, PARAMETERS)))
-        unsafe = np.flatnonzero(~(out.ratio >= PIVOT_GUARD))
+        unsafe = (~(out.ratio >= PIVOT_GUARD)).nonzero()[0]
         if len(unsafe):
             out.index[unsafe] = super().index(z[unsafe], p[unsafe])
         return out.index

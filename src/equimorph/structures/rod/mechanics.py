@@ -50,7 +50,7 @@ class RodMechanics(Equations):
         Kernels do not check what they read.
         """
         lanes = len(pairs[0][0])
-        shapes = (lanes, self.size), (lanes, self.parameters)
+        shapes = (lanes, self.unknowns + self.constraints), (lanes, self.parameters)
         for pair in pairs:
             if (pair[0].shape, pair[1].shape) != shapes:
                 wrong = int(pair[0].shape == shapes[0])

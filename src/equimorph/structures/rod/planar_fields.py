@@ -87,9 +87,12 @@ class Measured(StressedRod):
 
     def fields(self, z: Lanes, p: Parameters, s: Arclengths) -> Float[np.ndarray, "lanes points 4"]:
         """(θ, κ, x, y) at arclengths, recovered from the vertices."""
+        return np.asarray(self.mechanics.fields(z, p, s) * self._field_units)
+
+    @cached_property
+    def _field_units(self) -> Float[np.ndarray, "4"]:
         length = self.units.value("length")
-        units = np.array([1.0, self.units.value("curvature"), length, length])
-        return np.asarray(self.mechanics.fields(z, p, s) * units)
+        return np.array([1.0, self.units.value("curvature"), length, length])
 
     def places(self, z: Lanes, p: Parameters, s: Arclengths) -> Float[np.ndarray, "lanes points 2"]:
         """(x, y) at arclengths."""

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import pairwise
+from itertools import accumulate, pairwise
 from typing import Literal
 
 import numpy as np
@@ -196,7 +196,7 @@ def solve_shape(
         without a start.
     """
     columns = {each: np.array([value], dtype=float) for each, value in targets.items()}
-    return solve_shapes(eset, columns, within=within, start=start, rank=rank)[0]
+    return _answers(eset, columns, within, start, rank)[0]
 
 
 @check_arguments
@@ -234,6 +234,17 @@ def solve_shapes(
     InputError
         As for `solve_shape`, or if numbers of values differ.
     """
+    return _answers(eset, targets, within, start, rank)
+
+
+def _answers(
+    eset: EquilibriumSet,
+    targets: Mapping[Descriptor, Sequence[float] | Float[np.ndarray, " many"]],
+    within: Sequence[Constraint],
+    start: State | None,
+    rank: Rank | None,
+) -> tuple[Shapes, ...]:
+    """Solutions of each question; see `solve_shapes`."""
     numbers = _numbers(eset, targets)
     rank = rank or ("energy" if start is None else "route")
     if rank == "route" and start is None:
@@ -268,8 +279,8 @@ def _sort_keys(
     if len(states) and rank:
         key = states.energy if rank == "energy" else -states.margin
     index = states.index if len(states) else np.zeros(0, int)
-    ends = np.cumsum([len(own) for own in groups])[:-1]
-    return np.split(index, ends), np.split(key, ends)
+    bounds = [slice(*ends) for ends in pairwise(accumulate(map(len, groups), initial=0))]
+    return [index[own] for own in bounds], [key[own] for own in bounds]
 
 
 def _numbers(
@@ -324,19 +335,15 @@ def _solve(
     structure, eset, charted = known.eset.structure, known.eset, None
     if targets.shape[1] == len(eset.names) and known.chart is not None:
         charted = known.chart.find(targets)
-    guesses, owner = _guesses(known, targets, charted)
-    exact = states_with_values(known.setting, guesses, known.descriptors, targets[owner])
-    z, p, found = exact.z, exact.p, exact.found
+    states, owner = _exact(known, targets, charted)
     if charted is not None:
         owner = np.concatenate([owner, charted.point])
         order = np.argsort(owner, kind="stable")
-        z = np.concatenate([z, charted.states.z])[order]
-        p = np.concatenate([p, charted.states.p])[order]
-        found = np.concatenate([found, np.ones(len(charted.point), bool)])[order]
-        owner = owner[order]
-    found &= eset.box.holds(p[:, known.setting.free], slack=AT_EDGE)
-    found[found] &= worst_relative_excess(within, z[found], p[found]) <= AT_EDGE
-    states, owner = States(structure, z[found], p[found]), owner[found]
+        states, owner = join_states(structure, [states, charted.states])[order], owner[order]
+    allowed = eset.box.holds(states.p[:, known.setting.free], slack=AT_EDGE)
+    states, owner = states[allowed], owner[allowed]
+    held = worst_relative_excess(within, states.z, states.p) <= AT_EDGE
+    states, owner = states[held], owner[held]
     held = known.holds(states)
     states, owner = states[held], owner[held]
     bounds = np.searchsorted(owner, np.arange(len(targets) + 1))
@@ -364,10 +371,22 @@ def _members(
     return states[misfit <= EXACT], misfit[misfit <= EXACT]
 
 
+def _exact(
+    known: Predictor, targets: Float[np.ndarray, "many k"], charted: Found | None
+) -> tuple[States, Int[np.ndarray, " states"]]:
+    """States that Newton's method finds, and the questions that they belong to."""
+    at, owner = _guesses(known, targets, charted)
+    if at is None:
+        return known.eset.points[owner], owner
+    exact = states_with_values(known.setting, at, known.descriptors, targets[owner])
+    some = exact.found.nonzero()[0]
+    return States(known.eset.structure, exact.z[some], exact.p[some]), owner[some]
+
+
 def _guesses(
     known: Predictor, targets: Float[np.ndarray, "many k"], charted: Found | None
-) -> tuple[SetPoints, Int[np.ndarray, " lanes"]]:
-    """Starts of Newton's method, and the questions that they belong to.
+) -> tuple[SetPoints | None, Int[np.ndarray, " lanes"]]:
+    """Starts of Newton's method, and the questions that they belong to; None if there are none.
 
     None close to what the chart found.
     """
@@ -378,7 +397,7 @@ def _guesses(
         used, place = np.unique(vertices, return_inverse=True)
         return points_at_vertices(known.eset, used).take(place), owner
     shares, cells, owner = known.cells(targets, charted)
-    return known.guesses(shares, cells), owner
+    return known.guesses(shares, cells) if len(owner) else None, owner
 
 
 def _fit(
