@@ -136,7 +136,7 @@ def _system_at(structure: Equations, z: Lanes, p: Parameters) -> LinearSystem:
 
 
 def _null_border(system: LinearSystem, z: Lanes) -> Lanes:
-    b = np.tile(np.cos(1.3 * np.arange(z.shape[1])) + 1.1, (len(z), 1))
+    b = (np.cos(1.3 * np.arange(z.shape[1])) + 1.1)[None].repeat(len(z), axis=0)
     corner, rhs = np.zeros((len(z), 1, 1)), np.zeros((len(z), 1, z.shape[1] + 1))
     rhs[:, 0, -1] = 1.0
     for _ in range(4):

@@ -127,7 +127,10 @@ class ParameterLine(PlainCurve):
     def take(self, lanes: Some) -> "ParameterLine":
         """Return some of the lanes."""
         start, velocity = self.start.take(lanes, axis=0), self.velocity.take(lanes, axis=0)
-        return ParameterLine(self.structure, start, velocity)
+        some = ParameterLine(self.structure, start, velocity)
+        if "weight" in vars(self):  # what was computed is kept
+            vars(some)["weight"] = self.weight.take(lanes)
+        return some
 
     def parameters(self, t: Values) -> Parameters:
         """p(t)."""

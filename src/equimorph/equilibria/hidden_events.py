@@ -35,12 +35,15 @@ REGULAR_ENDS = EventCode.ARRIVED | EventCode.RETURNED | EventCode.CONSTRAINT
 """Bits of the events at whose points curves are regular."""
 
 
-def with_hidden_events(curve: Curve, z: Lanes, outcome: Traces, options: TraceOptions) -> Traces:
+def with_hidden_events(
+    curve: Curve, z: Lanes, outcome: Traces, options: TraceOptions, index: Some | None = None
+) -> Traces:
     """Traces of recorded lanes, started at z, completed by what their steps did not show.
 
-    The first hidden event that stops a lane becomes its end. See `hidden_events`.
+    The first hidden event that stops a lane becomes its end. See `hidden_events`. `index`: that of
+    the starts, if it is known.
     """
-    points = recorded_points(curve, z, outcome)
+    points = recorded_points(curve, z, outcome, index)
     inside = hidden_events(curve, points, options)
     last_ones = _before_ends(curve, points, outcome)
     hidden = within_ends(Events.join([inside, last_ones], z.shape[1]))
@@ -105,10 +108,10 @@ def _before_ends(curve: Curve, points: Points, outcome: Traces) -> Events:
     return locate_all(curve, [step], (), TraceOptions())
 
 
-def recorded_points(curve: Curve, z: Lanes, outcome: Traces) -> Points:
+def recorded_points(curve: Curve, z: Lanes, outcome: Traces, index: Some | None = None) -> Points:
     """Starts, recorded points, and the ends that are regular ones."""
     lanes, none = np.arange(len(z)), np.zeros(len(z))
-    index = curve.structure.index(z, curve.parameters(none))
+    index = curve.structure.index(z, curve.parameters(none)) if index is None else index
     start = Points(lanes, none, z, none, index)
     end = Points(lanes, outcome.travelled, outcome.z, outcome.t, outcome.index)
     regular = end.take(_regular(outcome.code))
@@ -231,7 +234,7 @@ def multiplicity(structure: Structure, z: Lanes, p: Parameters, near: Values) ->
     """Number of eigenvalues of the constrained Hessian, in the metric, within ±near of zero."""
     if len(z) == 0:
         return np.zeros(0, int)
-    twice = np.tile(z, (2, 1)), np.tile(p, (2, 1))
+    twice = np.concatenate([z, z]), np.concatenate([p, p])
     above, below = count_below(structure, *twice, np.concatenate([near, -near])).reshape(2, -1)
     return np.asarray(above - below)
 

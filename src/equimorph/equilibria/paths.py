@@ -123,7 +123,9 @@ def lift_one(
         begun = prepare_leg(here.batch, leg)
         if not begun.curve.weight[0] > 0.0:
             continue
-        outcome = _trace_one(begun, within, options, progress)
+        # the phase of states on orbits is picked anew
+        index = here.batch.index if begun.z is here.batch.z else None
+        outcome = _trace_one(begun, index, within, options, progress)
         outcome = with_multiple_points(begun.curve, begun.z, outcome)
         aside = _vanishing_events(begun.curve, begun.z, outcome)
         pieces.append(_segment(begun.curve, outcome, number, within, aside))
@@ -137,6 +139,7 @@ def lift_one(
 
 def _trace_one(
     leg: Prepared,
+    index: Numbers | None,
     within: tuple[Constraint, ...],
     options: TraceOptions,
     progress: Progress | None,
@@ -146,7 +149,7 @@ def _trace_one(
         outcome = trace(leg.curve, leg.z, within, options, progress=progress)
         if not leg.curve.folds_change_index:
             return outcome
-        outcome = with_hidden_events(leg.curve, leg.z, outcome, options)
+        outcome = with_hidden_events(leg.curve, leg.z, outcome, options, index)
         if outcome.why.get(0) != NOT_LOCATED or not options.retries:
             return outcome
         options = options.finer()
