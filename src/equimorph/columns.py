@@ -25,15 +25,16 @@ class Columns:
         self: Record, rows: Int[np.ndarray, " some"] | Bool[np.ndarray, " all"] | slice
     ) -> Record:
         """Return a selection of the rows, by numbers, flags or a slice."""
-        if isinstance(rows, np.ndarray) and rows.dtype == bool:
-            rows = rows.nonzero()[0]
-        numbers = not isinstance(rows, slice)
+        if isinstance(rows, slice):
+            return type(self)(*[_selection(field, rows) for field in self._fields])
+        some = np.asarray(rows)
+        numbers = some.nonzero()[0] if some.dtype == bool else some
         return type(self)(
             *[
                 # by numbers, `take` costs a fifth of brackets where rows are short
-                field.take(rows, axis=0)
-                if numbers and isinstance(field, np.ndarray)
-                else _selection(field, rows)
+                field.take(numbers, axis=0)
+                if isinstance(field, np.ndarray)
+                else _selection(field, numbers)
                 for field in self._fields
             ]
         )
@@ -56,13 +57,12 @@ class Columns:
 
     @property
     def _fields(self) -> tuple[Any, ...]:
-        return _reader(type(self))(self)
+        return _reader(self.__match_args__)(self)
 
 
 @cache
-def _reader(kind: type[Columns]) -> Callable[[Any], tuple[Any, ...]]:
-    """How the fields of records of a class are read, all at once."""
-    names = kind.__match_args__
+def _reader(names: tuple[str, ...]) -> Callable[[Any], tuple[Any, ...]]:
+    """How fields of records are read, all at once."""
     if len(names) < 2:
         return lambda record: tuple(getattr(record, name) for name in names)
     return attrgetter(*names)

@@ -309,7 +309,7 @@ class Cells:
         """Failed hits of cells that contain the point, or of points without a state."""
         states = np.bincount(hits.point[good], minlength=count)
         wanted = np.bincount(hits.point[hits.inside], minlength=count)
-        return (~good & (states < np.maximum(wanted, 1))[hits.point]).nonzero()[0]
+        return np.asarray((~good & (states < np.maximum(wanted, 1))[hits.point]).nonzero()[0])
 
     def _again(
         self, hits: Hits, z: Lanes, p: Parameters, good: Flags, again: Items, points: Points

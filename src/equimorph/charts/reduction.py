@@ -288,7 +288,7 @@ def _preferred_beside_folds(preference: Preference, some: Items, folded: VertexF
     z, structure = eset.points.z, eset.structure
     far = metric_length(structure, there.states.z - z[fold[there.point]])
     side = metric_length(structure, z[other[there.point]] - z[fold[there.point]])
-    return fold[there.point[far < MOVED * side]]
+    return np.asarray(fold[there.point[far < MOVED * side]])
 
 
 def _neighbours_off_folds(

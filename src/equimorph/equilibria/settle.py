@@ -293,7 +293,7 @@ class _Run:
 
     def record(self, here: Points, step: Step, status: Numbers) -> Some:
         """Note where the lanes are that ended, and what is known there; which lanes go on."""
-        left = (status == OPEN).nonzero()[0]
+        left = np.asarray((status == OPEN).nonzero()[0])
         if len(left) == len(status):
             return left
         some = np.flatnonzero(status != OPEN) if len(left) else slice(None)

@@ -146,7 +146,8 @@ def _above(
 
 def generic_vectors(structure: Pencil, lanes: int) -> Float[np.ndarray, "lanes unknowns"]:
     """Vectors that are orthogonal to no mode."""
-    return (np.cos(1.7 * np.arange(structure.unknowns)) + 1.3)[None].repeat(lanes, axis=0)
+    wave = np.cos(1.7 * np.arange(structure.unknowns)) + 1.3
+    return np.asarray(wave[None].repeat(lanes, axis=0))
 
 
 def inverse_step(
