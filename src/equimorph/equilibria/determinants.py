@@ -63,13 +63,14 @@ def hides_two_zeros(curve: Curve, step: Bracket) -> Bool[np.ndarray, " steps"]:
     with np.errstate(divide="ignore", invalid="ignore"):
         middle = value(np.arange(count), np.full(count, 0.5))
         values = np.stack([np.abs(ends[0]) / size, middle, np.abs(ends[1]) / size])
-    lanes = np.flatnonzero(may_vanish(values))
+    out, lanes = np.zeros(count, bool), np.flatnonzero(may_vanish(values))
+    if len(lanes) == 0:
+        return out
     places, values = np.array([[0.0], [0.5], [1.0]]).repeat(len(lanes), 1), values[:, lanes]
     for _ in range(LOOKS):
         least = _least_of_parabola(places, values)
         found = value(lanes, least)
         places, values = _around_least(places, values, least, found)
-    out = np.zeros(count, bool)
     out[lanes] = values[1] < NEARLY_ZERO
     return out
 

@@ -78,7 +78,7 @@ class Points:
         capacity = len(self.z)
         if self.count + extra <= capacity:
             return
-        grown = max(2 * capacity, self.count + extra, 64)
+        grown = max(2 * capacity, self.count + extra, 2 * len(self.head), 64)
         for name in ("z", "p", "index", "kind", "vertex", "edge", "following"):
             old = getattr(self, name)
             new = np.empty((grown, *old.shape[1:]), old.dtype)  # takes no memory until it is used

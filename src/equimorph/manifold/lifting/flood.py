@@ -92,7 +92,7 @@ def _refuse_endless(pairing: Pairing) -> None:
     """Raise EndlessError if a set grows without end, like one that winds around a circle."""
     store, setting = pairing.points, pairing.setting
     vertex = store.vertex[: store.count]
-    sheets = np.bincount(vertex[vertex >= 0], minlength=1)
+    sheets = np.bincount(vertex + 1, minlength=2)[1:]  # −1: over none
     if sheets.max() < REPEATED:
         return
     p = setting.parameters(pairing.mesh.vertices[sheets.argmax()][None])[0, setting.free]

@@ -243,10 +243,12 @@ class _Corners:
 
     def varying(self, pairs: _Pairs) -> tuple[_Pairs, "_Corners"]:
         """Pairs of sheets whose distance varies enough around their cells to vanish inside."""
-        around, squared = self.squared.copy(), self.squared[self.place]
-        for corner in self.place.T:
-            np.maximum.at(around, corner, squared.max(axis=1))
-        kept = around[self.place].max(axis=1) > VARYING * squared.min(axis=1)
+        corners, around = np.ascontiguousarray(self.place.T), self.squared.copy()
+        squared = self.squared[corners]
+        largest = squared.max(axis=0)
+        for corner in corners:
+            np.maximum.at(around, corner, largest)
+        kept = np.flatnonzero(around[corners].max(axis=0) > VARYING * squared.min(axis=0))
         used, place = np.unique(self.place[kept], return_inverse=True)
         columns = (self.one[used], self.other[used], self.squared[used])
         return pairs.take(kept), _Corners(*columns, place.reshape(-1, self.place.shape[1]))
@@ -284,34 +286,30 @@ def _pairs(pairing: Pairing, cells: Cells, wanted: Some) -> _Pairs:
     grid, base = np.sort(mesh.cells[wanted], axis=1), len(mesh.vertices)
     below = np.zeros(base + 1, bool)
     below[grid] = True  # −1, where a corner lies over no vertex, stays false
-    corners, vertex = cells.corners, points.vertex[cells.corners]
-    plain = below[vertex].all(axis=1)
-    order = np.argsort(vertex[plain], axis=1)
-    vertex = np.take_along_axis(vertex[plain], order, axis=1)
-    corners = np.take_along_axis(corners[plain], order, axis=1)
-    index, owner = cells.index[plain], places_among(vertex, grid, base)
-    good = owner >= 0
-    corners, index, owner = corners[good], index[good], owner[good]
-    by_owner = np.argsort(owner, kind="stable")
-    corners, index, owner = corners[by_owner], index[by_owner], owner[by_owner]
-    sheets = np.bincount(owner, minlength=len(grid))
+    vertex = points.vertex[cells.corners]
+    plain = np.flatnonzero(below[vertex].all(axis=1))
+    vertex = vertex.take(plain, axis=0)
+    order = np.argsort(vertex, axis=1)
+    owner = places_among(np.take_along_axis(vertex, order, axis=1), grid, base)
+    good = np.flatnonzero(owner >= 0)
+    good = good[np.argsort(owner[good], kind="stable")]
+    rows, owner, order = plain[good], owner[good], order.take(good, axis=0)
+    corners = np.take_along_axis(cells.corners.take(rows, axis=0), order, axis=1)
+    index, sheets = cells.index[rows], np.bincount(owner, minlength=len(grid))
     ones, others = [np.zeros(0, int)], [np.zeros(0, int)]
     for shift in range(1, int(sheets.max(initial=0))):
-        first = np.arange(len(owner) - shift)
-        both = (owner[first] == owner[first + shift]) & (
-            np.abs(index[first] - index[first + shift]) == 1
-        )
-        ones.append(first[both])
-        others.append(first[both] + shift)
+        same = owner[:-shift] == owner[shift:]
+        first = np.flatnonzero(same & (np.abs(index[:-shift] - index[shift:]) == 1))
+        ones.append(first)
+        others.append(first + shift)
     one, other = np.concatenate(ones), np.concatenate(others)
     # corners in the order of the grid cell, in which shares are counted
-    owner = wanted[owner]
-    back = np.argsort(np.argsort(mesh.cells[owner[one]], axis=1), axis=1)
-    return _Pairs(
-        owner[one],
-        np.take_along_axis(corners[one], back, axis=1),
-        np.take_along_axis(corners[other], back, axis=1),
-    )
+    cell = wanted[owner[one]]
+    order = np.argsort(mesh.cells.take(cell, axis=0), axis=1)
+    pairs = np.empty((2, *order.shape), int)
+    for own, rows in zip(pairs, (one, other), strict=True):
+        np.put_along_axis(own, order, corners.take(rows, axis=0), axis=1)
+    return _Pairs(cell, *pairs)
 
 
 def _data(d: int) -> Float[np.ndarray, "data terms"]:
