@@ -261,7 +261,7 @@ class Pairing:
         )  # fmt: skip
         new = np.flatnonzero(numbers >= 0)
         self.curves.extend(rays.edges[new], rays.points[new], ends[new])
-        return numbers
+        return np.asarray(numbers)
 
     def enter_many(self, rays: Rays, ends: Items) -> None:
         """Register curves without inner points: at once where nothing is known, else singly."""
