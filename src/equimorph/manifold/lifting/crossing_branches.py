@@ -153,9 +153,8 @@ def lead_out(
     for _ in range(TURNS):
         goal = mesh.edges[edges, towards]
         way = setting.parameters(mesh.vertices[goal]) - p
-        options = TraceOptions(
-            through_folds=True, through_branch_points=True, first_step=0.005, record=False
-        )
+        # recorded: a regular point between two singular ones begins at a state on the way
+        options = TraceOptions(through_folds=True, through_branch_points=True, first_step=0.005)
         ways = ParameterLine(setting.structure, p, way)
         outcome = trace(ways, z, setting.constraints, options)
         leads_on = np.isin(outcome.code, (EventCode.RETURNED, EventCode.CONSTRAINT))

@@ -46,7 +46,7 @@ def followed_ways(pairing: Pairing, plans: list[Plan], choices: list[Ways]) -> l
         known = {fold: exits.get((plan.polygon.triangle, fold)) for fold in folds}
         left = {fold: exit_ for fold, exit_ in known.items() if exit_ is not None}
         ends = dict(
-            zip(left, nearest_at(pairing, list(left.values()), np.array(folds)), strict=True)
+            zip(left, nearest_at(pairing, list(left.values()), np.array(folds, int)), strict=True)
         )
         chords = {chord_of(fold, end) for fold, end in ends.items() if end >= 0}
         followed.append([way for way in ways if chords <= set(way)])
