@@ -12,7 +12,7 @@ from equimorph.charts.coordinates import frames_anywhere
 from equimorph.equilibria import find_equilibria
 from equimorph.manifold import VertexKind
 from equimorph.manifold.geometry.kernels import match_or_add
-from equimorph.manifold.geometry.tangents import bend_along, frames_in_embedding, split_step
+from equimorph.manifold.geometry.tangents import InPlanes, frames_in_embedding, split_step
 from oracles.complexes import assert_faithful, assert_folds_are_singular
 
 
@@ -180,7 +180,7 @@ def test_sets_bend_as_their_second_derivative_says(arch_set, fold):
     frames = frames_anywhere(setting, at.z, at.p)
     rows = frames_in_embedding(setting, frames)
     step = np.einsum("k,lkf->lf", [0.8, 0.6], frames)
-    bend = bend_along(setting, at.z, at.p, rows, step)
+    bend = InPlanes(setting, at.z, at.p, rows).bend_along(step)
     sizes = []
     for h in (2e-2, 1e-2):
         dz, dp = split_step(setting, h * step + 0.5 * h**2 * bend)
