@@ -48,13 +48,13 @@ def _guesses(
 ) -> tuple[Float[np.ndarray, "n size"], Float[np.ndarray, "n parameters"], Items]:
     """Guesses of the twins that are near enough, and the number of the state of each."""
     setting = coordinates.setting
-    here = InPlanes(setting, z, p, rows)
-    frames = here.frames
+    planes = InPlanes(setting, z, p, rows)
+    frames = planes.frames
     slopes = coordinates.derivative(z, p, frames) / ranges[:, None]
     left, sizes, right = np.linalg.svd(slopes)
     steps = np.einsum("lk,lkf->lf", right[:, -1], frames)
     dz, dp = split_step(setting, steps)
-    bent = split_step(setting, here.bend_along(steps))
+    bent = split_step(setting, planes.bend_along(steps))
     # both sides at once: single states cost calls, not arithmetic
     every = (
         np.concatenate([here, here - STEP * d + half, here + STEP * d + half])

@@ -222,10 +222,32 @@ def states_with_values(
 
 
 STARTS = 12
-"""Local minima over the vertices from which fits are searched."""
+"""Local minima over the vertices from which fits and members of families are searched."""
 
 NEAR = 1.0
 """Farthest way from the prediction, in lengths of the edge, of a state that belongs to it."""
+
+
+def states_predicted(
+    known: Predictor, targets: Float[np.ndarray, "many k"], charted: Found | None
+) -> tuple[States, Int[np.ndarray, " states"]]:
+    """States to which Newton's method leads from predictions, and the questions of each.
+
+    From none close to what the chart found.
+    """
+    if targets.shape[1] < len(known.eset.names):
+        starts = [local_minima(known.edges, known.misfits(each))[:STARTS] for each in targets]
+        owner = np.repeat(np.arange(len(targets)), [len(each) for each in starts])
+        used, place = np.unique(np.concatenate(starts), return_inverse=True)
+        at = points_at_vertices(known.eset, used).take(place)
+    else:
+        shares, cells, owner = known.cells(targets, charted)
+        if len(owner) == 0:
+            return known.eset.points[owner], owner
+        at = known.guesses(shares, cells)
+    exact = states_with_values(known.setting, at, known.descriptors, targets[owner])
+    some = exact.found.nonzero()[0]
+    return States(known.eset.structure, exact.z[some], exact.p[some]), owner[some]
 
 
 def best_fits(

@@ -10,11 +10,9 @@ import numpy as np
 
 from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Float, Int, Values
-from equimorph.charts.location import Found
 from equimorph.errors import InputError
 from equimorph.manifold import EquilibriumSet, Level
 from equimorph.manifold.complex.equilibrium_set import check_cells
-from equimorph.manifold.queries.nearest import SetPoints, local_minima, points_at_vertices
 from equimorph.model import NOT_KEPT, Constraint, Descriptor, Schedule, worst_relative_excess
 from equimorph.structures import State, States, join_states
 from equimorph.tasks.distances import distinct
@@ -26,7 +24,7 @@ from equimorph.tasks.shapes.prediction import (
     best_fits,
     predictor,
     solution_family,
-    states_with_values,
+    states_predicted,
 )
 from equimorph.tasks.stable_part import feasible_vertices, stable_vertices
 from equimorph.tolerances import SAME_STATE
@@ -35,8 +33,6 @@ AT_EDGE = 1e-9
 """Largest excess of a solution over the box or a constraint, in their units."""
 EXACT = 1e-8
 """Misfit, in ranges over the set, below which values are met."""
-STARTS = 12
-"""Vertices from which members of a family are searched."""
 
 Rank = Literal["route", "energy", "margin"]
 
@@ -335,7 +331,7 @@ def _solve(
     structure, eset, charted = known.eset.structure, known.eset, None
     if targets.shape[1] == len(eset.names) and known.chart is not None:
         charted = known.chart.find(targets)
-    states, owner = _exact(known, targets, charted)
+    states, owner = states_predicted(known, targets, charted)
     if charted is not None:
         owner = np.concatenate([owner, charted.point])
         order = np.argsort(owner, kind="stable")
@@ -369,35 +365,6 @@ def _members(
     """Members of a family within the box and constraints."""
     states, misfit = _fit(known, targets, within)
     return states[misfit <= EXACT], misfit[misfit <= EXACT]
-
-
-def _exact(
-    known: Predictor, targets: Float[np.ndarray, "many k"], charted: Found | None
-) -> tuple[States, Int[np.ndarray, " states"]]:
-    """States that Newton's method finds, and the questions that they belong to."""
-    at, owner = _guesses(known, targets, charted)
-    if at is None:
-        return known.eset.points[owner], owner
-    exact = states_with_values(known.setting, at, known.descriptors, targets[owner])
-    some = exact.found.nonzero()[0]
-    return States(known.eset.structure, exact.z[some], exact.p[some]), owner[some]
-
-
-def _guesses(
-    known: Predictor, targets: Float[np.ndarray, "many k"], charted: Found | None
-) -> tuple[SetPoints | None, Int[np.ndarray, " lanes"]]:
-    """Starts of Newton's method, and the questions that they belong to; None if there are none.
-
-    None close to what the chart found.
-    """
-    if targets.shape[1] < len(known.eset.names):
-        starts = [local_minima(known.edges, known.misfits(each))[:STARTS] for each in targets]
-        vertices = np.concatenate(starts)
-        owner = np.repeat(np.arange(len(targets)), [len(each) for each in starts])
-        used, place = np.unique(vertices, return_inverse=True)
-        return points_at_vertices(known.eset, used).take(place), owner
-    shares, cells, owner = known.cells(targets, charted)
-    return known.guesses(shares, cells) if len(owner) else None, owner
 
 
 def _fit(
