@@ -6,6 +6,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from equimorph.arrays import Float, Lanes, Parameters
+from equimorph.linalg.lanes import over_lanes
 from equimorph.model import Support
 from equimorph.model.drawing import supports_of_point
 from equimorph.structures.frame.any_frame import AnyFrame
@@ -14,10 +15,11 @@ from equimorph.structures.frame.strength import Nodal, NodalStrains
 from equimorph.structures.material_points import SupportSpring
 from equimorph.structures.rod.extrema import largest_norms
 from equimorph.structures.space_frame.model import SpatialFrameModel
+from equimorph.structures.space_frame.moment_kernels import moments_lanes
 from equimorph.structures.space_frame.network import SpatialNetwork, Turning
 from equimorph.structures.space_frame.orbits import OrbitFrameMechanics
+from equimorph.structures.spatial.mechanics import pairs_of
 from equimorph.structures.spatial.quaternions import (
-    RIGHT,
     exponential,
     gather,
     matrices,
@@ -156,25 +158,16 @@ class SpatialFrameFields(OrbitFrameMechanics, AnyFrame):
         Ends of elements carry what the element's gradient says; inside ``m' = f × r'`` is
         integrated, and the remaining difference is distributed in proportion.
         """
-        model = self.model
-        _, w, _, y = self.jets(z, p)
-        local, axes = self.element_slopes(w, y)[0], w[0][:, model.nodes]
-        turned = np.einsum("kab,leib->leika", RIGHT, axes)
-        gradient = 0.5 * np.einsum("leika,leia->leik", turned, local)
-        world = np.einsum("leiab,leib->leia", matrices(axes), gradient)
-        chord = self.chords(w, y)[0] / model.weights[..., None]
-        turning = np.cross(self.forces(y)[0], chord)
-        sums = model.mesh.reference.integral * model.element_lengths[:, None, None]
-        change = np.einsum("eij,leja->leia", sums, turning)
-        gap = world[:, :, -1] + world[:, :, 0] - change[:, :, -1]
-        share = model.mesh.reference.nodes[:, None]
-        return np.asarray(change - world[:, :, :1] + gap[:, :, None] * share)
+        sections = self.cross_sections(z, p)
+        return np.asarray(np.einsum("leica,leia->leic", sections, self.section_moments(z, p)))
 
     def section_moments(self, z: Lanes, p: Parameters) -> Vectors:
         """Moments on the axes t, n, b of the cross-sections at the points."""
-        return np.asarray(
-            np.einsum("leica,leic->leia", self.cross_sections(z, p), self.moments(z, p))
-        )
+        self.scalars(z, p)
+        out = np.empty((len(z), 3 * self.model.nodes.size))
+        given = [np.ascontiguousarray(each) for each in (z, p)]
+        over_lanes(moments_lanes, (*pairs_of(1), *self.tables.of_moments), given, [out])
+        return out.reshape(len(z), *self.model.nodes.shape, 3)
 
     def elastic_strains(self, z: Lanes, p: Parameters) -> Vectors:
         """Elastic twist and curvatures about n and b at the points, per length as drawn."""
@@ -190,7 +183,8 @@ class SpatialFrameFields(OrbitFrameMechanics, AnyFrame):
         """Twist and curvatures about n and b at the points, per length as drawn."""
         model = self.model
         elastic = self.elastic_strains(z, p)
-        free = self.actuated_strains(self.jets(z, p)[3])[0][0][:, model.owner]
+        own = self.scalars(z, p)[None]
+        free = self.actuated_strains(own)[0][0][:, model.owner]
         bends = np.array([float(each.curvature) for each in model.network.members]) * model.length
         drawn = bends[model.network.owner][model.owner][:, None] * np.array([0.0, 0.0, 1.0])
         return np.asarray(elastic + (free + drawn)[:, :, None])

@@ -25,9 +25,6 @@ from equimorph.structures.spatial.quaternions import (
     turn_about,
 )
 
-BLOCK = 16
-"""Lanes computed together: their arrays stay in the cache."""
-
 
 class SpatialFrameLagrangian:
     """The Lagrangian of a `SpatialFrameModel`; methods as in `structures.contract`."""
@@ -189,33 +186,6 @@ class SpatialFrameLagrangian:
 
     # --- contract -------------------------------------------------------------------------------
 
-    def equations(self, z: Lanes, p: Parameters, *directions: Direction) -> Jet:
-        """F with its derivatives along directions."""
-        starts = range(0, max(len(z), 1), BLOCK)
-        parts = []
-        for start in starts:
-            at = slice(start, start + BLOCK)
-            parts.append(self._equations(z[at], p[at], *((d[at], e[at]) for d, e in directions)))
-        return np.concatenate(parts, axis=1)
-
-    def _equations(self, z: Lanes, p: Parameters, *directions: Direction) -> Jet:
-        """`equations` of one block of lanes."""
-        model = self.model
-        q, w, angles, y = self.jets(z, p, *directions)
-        unit, inverse, square = normalise(q)
-        slope = self.slope(w, y)
-        by_angle = self.lean_on_parents(slope, w, angles)
-        own = slope[:, :, model.free]
-        along = bilinear(dot, unit, own)
-        across = own - bilinear(_scale, along, unit)
-        excess = square.copy()
-        excess[0] -= 1.0
-        out = bilinear(_scale, inverse, across)
-        out = out + 0.5 * model.stiff_lengths[:, None] * bilinear(_scale, excess, q)
-        closing = self.by_scalars(w, y)[..., : self.constraints]
-        flat = out.reshape(*out.shape[:2], self._rows)
-        return np.concatenate([flat, by_angle, closing], axis=-1)
-
     def lean_on_parents(self, slope: Jet, w: Jet, angles: Jet) -> Jet:
         """Add the slopes at hinged nodes to those of their parents; slopes by the angles."""
         model = self.model
@@ -229,10 +199,6 @@ class SpatialFrameLagrangian:
         leaning = bilinear(product, here, conjugate(turned))
         slope += gather(leaning, model.parents, len(model.turning))
         return by_angle
-
-    def second_derivative(self, z: Lanes, p: Parameters, v: Direction, w: Direction) -> Lanes:
-        """D²F[v, w]."""
-        return np.asarray(self.equations(z, p, v, w)[3])
 
     def effort(self, z: Lanes, p: Parameters) -> Parameters:
         """∂L/∂p: what actuators bear, and minus the travel of loads."""

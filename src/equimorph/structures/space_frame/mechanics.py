@@ -12,13 +12,15 @@ from equimorph.linalg.determinants import clear_overflows
 from equimorph.linalg.lanes import over_lanes
 from equimorph.linalg.sparse import SparseLayout
 from equimorph.structures.discrete import linearise
-from equimorph.structures.equations import AnyBorder, JointEquations, Shift, Solver
+from equimorph.structures.equations import AnyBorder, Direction, JointEquations, Shift, Solver
+from equimorph.structures.space_frame.derivative_kernels import equations_lanes
 from equimorph.structures.space_frame.energy_kernels import energies_lanes
 from equimorph.structures.space_frame.kernels import linearise_lanes
 from equimorph.structures.space_frame.lagrangian import SpatialFrameLagrangian
 from equimorph.structures.space_frame.model import SpatialFrameModel
 from equimorph.structures.space_frame.network import Turning
 from equimorph.structures.space_frame.reduction_kernels import eliminate_lengths, restore_lengths
+from equimorph.structures.spatial.mechanics import pairs_of
 from equimorph.structures.spatial.quaternions import (
     are_near,
     conjugate,
@@ -211,6 +213,34 @@ class Tables:
         )  # fmt: skip
 
     @cached_property
+    def _by_jets(self) -> tuple[np.ndarray, ...]:
+        """What supports hold, elements, forces that act in pieces, nodes and hinges."""
+        model, acting = self.model, self.model.acting
+        slopes = model.mesh.reference.derivative / model.element_lengths[:, None, None]
+        return (
+            model.patterns.turns[:, model.held], model.nodes, model.owner, slopes, model.weights,
+            model.tangents, model.arclengths, model.stiff, model.moment_of_strain,
+            model.compliance, acting.counts, acting.numbers, acting.start, acting.drop,
+            model.strains, model.elongation[..., None], model.free, model.held, model.hinged,
+            model.parents, model.hinge_axes,
+        )  # fmt: skip
+
+    @cached_property
+    def of_jets(self) -> tuple[np.ndarray, ...]:
+        """What the kernel of F and its derivatives along directions shares among lanes."""
+        model = self.model
+        arrays = *self._by_jets, model.stiff_lengths, model.quadratic[: model.multipliers]
+        return tuple(np.ascontiguousarray(array) for array in arrays)
+
+    @cached_property
+    def of_moments(self) -> tuple[np.ndarray, ...]:
+        """What the kernel of moments shares among lanes."""
+        model, reference = self.model, self.model.mesh.reference
+        sums = reference.integral * model.element_lengths[:, None, None]
+        arrays = *self._by_jets, sums, reference.nodes, model.drawn
+        return tuple(np.ascontiguousarray(array) for array in arrays)
+
+    @cached_property
     def of_energy(self) -> tuple[np.ndarray, ...]:
         """What the kernel of energies shares among lanes."""
         model = self.model
@@ -251,6 +281,16 @@ class SpatialFrameMechanics(SpatialFrameLagrangian, JointEquations):
         found, given = np.empty(len(z)), [np.ascontiguousarray(each) for each in (z, p)]
         over_lanes(energies_lanes, self.tables.of_energy, given, [found])
         return found
+
+    def second_derivative(self, z: Lanes, p: Parameters, v: Direction, w: Direction) -> Lanes:
+        """D²F[v, w]."""
+        for each in ((z, p), v, w):
+            self.scalars(*each)
+        given = [np.ascontiguousarray(each) for each in (z, p)]
+        given += [np.stack(each, axis=1) for each in zip(v, w, strict=True)]
+        out = np.empty((len(z), 4, self.size))
+        over_lanes(equations_lanes, (*pairs_of(4), *self.tables.of_jets), given, [out])
+        return out[:, 3].copy()
 
     def linearised(
         self, z: Lanes, p: Parameters, dp: Parameters, shift: Shift = None
