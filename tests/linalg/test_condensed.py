@@ -5,6 +5,7 @@ import pytest
 
 from equimorph.linalg import CondensedLayout, solve_bordered
 from equimorph.linalg.condensed import PIVOT_GUARD
+from equimorph.linalg.null_vectors import near_null
 
 ENDS = [(0, 0), (0, 1), (1, 0), (1, 1)]
 
@@ -140,3 +141,33 @@ def test_solutions_with_a_small_pivot_are_refined_to_full_accuracy():
     np.testing.assert_array_equal(solution.negative, dense.negative)
     size = np.abs(dense.x).max(axis=(1, 2), keepdims=True)
     np.testing.assert_allclose(solution.x / size, dense.x / size, atol=1e-12)
+
+
+@pytest.mark.parametrize("lanes", [0, 1, 3, 13])
+def test_null_vectors_at_once_are_those_of_single_solves(lanes):
+    """Bit for bit, lanes with an unsafe pivot and those that are not numbers among them."""
+    layout = random_layout(np.random.default_rng(5), 5, 4)
+    diagonal, border = (
+        each[:lanes] for each in random_system(np.random.default_rng(6), layout)[:2]
+    )
+    diagonal[1:2, 1] = -layout.stiffness[0, 1, 1]
+    diagonal[2:3] = np.nan
+
+    def solve(rhs, around):
+        return layout.solve(diagonal, border, *around, rhs)
+
+    found = layout.near_null(diagonal, border)
+    size = layout.unknown.stop - layout.unknown.start + border.shape[1]
+    np.testing.assert_array_equal(found, near_null(solve, lanes, size))
+
+
+def test_null_vectors_of_nearly_singular_matrices():
+    """Closed form: the eigenvector that belongs to the one small eigenvalue, 1e-6."""
+    generator = np.random.default_rng(8)
+    layout = random_layout(generator, 5, 4)
+    diagonal, border = random_system(generator, layout, lanes=1, m=0)[:2]
+    sizes, vectors = np.linalg.eigh(layout.dense(diagonal, border)[0])
+    nearest = np.argmin(np.abs(sizes))
+    diagonal = diagonal - sizes[nearest] + 1e-6
+    found = layout.near_null(diagonal, border)[0]
+    np.testing.assert_allclose(abs(found @ vectors[:, nearest]), 1.0, atol=1e-10)

@@ -122,31 +122,17 @@ Test = Callable[[Critical], Values]
 
 def null_border(structure: Equations, z: Lanes, p: Parameters) -> Lanes:
     """Unit vectors near the null vectors of F_z, by bordered solves that stay regular there."""
-    return _null_border(_system_at(structure, z, p), z)
+    return _system_at(structure, z, p).null_border()
 
 
 def nearly_singular(structure: Equations, z: Lanes, p: Parameters) -> Critical:
     """Points seen through unit vectors near their null vectors."""
     system = _system_at(structure, z, p)
-    return Critical(structure, z, p, _null_border(system, z), system)
+    return Critical(structure, z, p, system.null_border(), system)
 
 
 def _system_at(structure: Equations, z: Lanes, p: Parameters) -> LinearSystem:
     return structure.linear_system(z, p, np.zeros((len(z), 0, p.shape[1])))
-
-
-def _null_border(system: LinearSystem, z: Lanes) -> Lanes:
-    b = (np.cos(1.3 * np.arange(z.shape[1])) + 1.1)[None].repeat(len(z), axis=0)
-    corner, rhs = np.zeros((len(z), 1, 1)), np.zeros((len(z), 1, z.shape[1] + 1))
-    rhs[:, 0, -1] = 1.0
-    for _ in range(4):
-        b = _unit(b)[:, None]
-        b = system.solve(rhs, (b, b, corner)).x[:, 0, :-1]
-    return np.ascontiguousarray(_unit(b))
-
-
-def _unit(vectors: Lanes) -> Lanes:
-    return np.asarray(vectors / np.sqrt((vectors * vectors).sum(axis=1, keepdims=True)))
 
 
 def null_vectors(

@@ -266,7 +266,7 @@ class AlongCurve(Equations):
         if force is None:
             return system
         columns = system.columns - dt * force[1][:, None]
-        return LinearSystem(system.residual - force[0], columns, system.solve)
+        return replace(system, residual=system.residual - force[0], columns=columns)
 
     def index(self, z: Lanes, p: Parameters) -> Numbers:
         """Negative eigenvalues of the constrained Hessian."""

@@ -79,8 +79,11 @@ def inside_spans(curve: Curve, span: Span, options: TraceOptions) -> Events:
     """Events between two points of lanes that neither the index nor the direction shows."""
     if len(span.lane) == 0:
         return Events.join([], curve.metric.size)
-    here = curve.take(span.lane)
-    low, high = probe_at(here, span.before, span.start), probe_at(here, span.after, span.stop)
+    # both ends at once: calls cost more than lanes
+    count, length = len(span.lane), np.concatenate([span.start, span.stop])
+    here = curve.take(np.tile(span.lane, 2))
+    both = probe_at(here, Front.concatenate([span.before, span.after]), length)
+    low, high = both.take(slice(count)), both.take(slice(count, None))
     smaller, larger = np.sort(np.abs([low.value, high.value]), axis=0)
     # a path may start or arrive right at an event: that is no hidden one
     open_ = np.flatnonzero(~(smaller <= AT_EVENT * larger))

@@ -11,6 +11,8 @@ from equimorph.linalg.bordered_kernels import solve_condensed
 from equimorph.linalg.dense import BorderedSolution, solve_bordered
 from equimorph.linalg.determinants import clear_overflows
 from equimorph.linalg.lanes import over_lanes
+from equimorph.linalg.null_vectors import ROUNDS, first_guess, near_null, unit_rows, unit_sides
+from equimorph.linalg.simd import LANES
 
 PIVOT_GUARD = 1e-8
 """Smallest pivot ratio that is trusted as it is; below it solutions are refined.
@@ -181,6 +183,36 @@ class CondensedLayout:
             determinant[pivoted] = again.determinant
         clear_overflows(determinant)
         return BorderedSolution(x, negative, ratio, pivoted, determinant)
+
+    def near_null(
+        self, diagonal: Float[np.ndarray, "lanes nodes"], border: Float[np.ndarray, "lanes m nodes"]
+    ) -> Float[np.ndarray, "lanes size"]:
+        """Unit vectors near null vectors of ``[H B; Bᵀ 0]``: `null_vectors.near_null` at once.
+
+        Lanes with an unsafe pivot go through `solve`.
+        """
+        (lanes, m, _), size = border.shape, self.unknown.stop - self.unknown.start + border.shape[1]
+        if lanes == 0:
+            return np.zeros((0, size))
+        # whole blocks: the last lane fills up one with fewer
+        at = np.minimum(np.arange(max(lanes, LANES)), lanes - 1)
+        matrix, rest = (diagonal[at], border[at]), np.zeros((len(at), m, m))
+        corner, rhs = np.zeros((len(at), 1, 1)), unit_sides(len(at), size)
+        bent, least = (np.empty((len(at), 0)), np.empty(len(at))), np.full(len(at), np.inf)
+        v = first_guess(len(at), size)
+        for _ in range(ROUNDS):
+            b = unit_rows(v)[:, None]
+            x, _, ratio, _ = self._solve(*matrix, b, b, corner, rhs, rest, *bent)
+            v = x[:, 0, :-1]
+            np.minimum(least, ratio, out=least)
+        found = unit_rows(v[:lanes])
+        unsafe = (~(least[:lanes] >= PIVOT_GUARD)).nonzero()[0]
+        if len(unsafe):
+            own = diagonal[unsafe], border[unsafe]
+            found[unsafe] = near_null(
+                lambda rhs, around: self.solve(*own, *around, rhs), len(unsafe), size
+            )
+        return found
 
     def _check(self, *arrays: np.ndarray) -> None:
         """Refuse shapes that do not fit: the kernel does not check what it reads."""

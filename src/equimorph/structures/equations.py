@@ -11,6 +11,7 @@ import numpy as np
 from equimorph.arrays import Determinants, Directions, Float, Int, Lanes, Parameters, Sides, Values
 from equimorph.linalg import Border, BorderedSolution
 from equimorph.linalg.intervals import Interval
+from equimorph.linalg.null_vectors import near_null
 
 Direction = tuple[Lanes, Parameters]
 
@@ -82,12 +83,20 @@ Solver = Callable[[Sides, AnyBorder], BorderedSolution]
 class LinearSystem:
     """F and its derivatives at points, computed together.
 
-    residual: F; columns: F_p·d for each of k directions; solve: with F_z, bordered or not.
+    residual: F; columns: F_p·d for each of k directions; solve: with F_z, bordered or not;
+    near_null: what `null_border` computes, where that is possible at once.
     """
 
     residual: Lanes
     columns: Float[np.ndarray, "lanes k size"]
     solve: Solver
+    near_null: Callable[[], Lanes] | None = None
+
+    def null_border(self) -> Lanes:
+        """Unit vectors near the null vectors of F_z, by bordered solves that stay regular there."""
+        if self.near_null is not None:
+            return self.near_null()
+        return near_null(self.solve, *self.residual.shape)
 
 
 @dataclass(frozen=True)

@@ -164,14 +164,20 @@ def newton(
     given = result, (limits.too_long_of(lanes), exempt), weights, limits.lengths
     longest, left, number = float(limits.longest), lanes, 0
     free = limits.iterations if limits.contraction == np.inf else limits.free
+    step, ratio = _no_step(most, size), np.empty(most)
     while left > 0 and number < limits.iterations:
-        if loop is not None:
-            rule, progress = (longest, free, limits.iterations), (left, number)
-            left, number = loop.run(loop.tables, loop.guards[k], work, progress, *given, rule)
+        if loop is None:
+            step = _step(equations, work, slice(max(left, LANES)))
+        else:
+            rule, guard = (longest, free, limits.iterations), loop.guards[k]
+            told = step, ratio, (left, number)
+            left, number = loop.run(loop.tables, guard, work, *told, *given, rule)
             if left == 0 or number == limits.iterations:
                 break
+            unsafe = (~(ratio[:left] >= guard)).nonzero()[0]
+            for column, own in zip(step, _step(equations, work, unsafe), strict=True):
+                column[unsafe] = own
         number += 1
-        step = _step(equations, work, max(left, LANES))
         stage = (number <= free, number >= limits.iterations, number == 1)
         left = correct_lanes(step, work, left, *given, longest, stage)
     return Newton(*result)
@@ -200,13 +206,22 @@ def _shared(
     return Newton(*(np.concatenate(each) for each in zip(*found, strict=True)))
 
 
-def _step(equations: Steps, work: tuple[np.ndarray, ...], m: int) -> tuple[np.ndarray, ...]:
-    """One step of the first m lanes at work, as `correct_lanes` takes it."""
-    z, p, dp, row, corner = (each[:m] for each in work[2:])
+def _no_step(lanes: int, size: int) -> tuple[np.ndarray, ...]:
+    """A step, as `correct_lanes` takes it, to be written."""
+    dz, tangent_z = np.empty((2, lanes, size))
+    dt, tangent_t = np.empty((2, lanes))
+    return dz, dt, np.empty(lanes, int), tangent_z, tangent_t
+
+
+def _step(
+    equations: Steps, work: tuple[np.ndarray, ...], some: Numbers | slice
+) -> tuple[np.ndarray, ...]:
+    """One step of some of the lanes at work."""
+    z, p, dp, row, corner = (each[some] for each in work[2:])
     if dp.shape[1] == 0:
         step = equations.correction(z, p)
     else:
-        step = equations.advance(z, p, dp, row, corner, np.zeros(m))
+        step = equations.advance(z, p, dp, row, corner, np.zeros(len(z)))
     return step.dz, step.dt, step.index, step.tangent_z, step.tangent_t
 
 

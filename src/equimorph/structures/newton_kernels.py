@@ -113,21 +113,22 @@ def newton_of(step):
     """
 
     @template(**FLAGS)
-    def iterate(work, tables, guard, lanes, progress, result, guards, weights, limits, rule):
+    def iterate(work, tables, guard, lanes, moves, ratio, progress, result, guards, weights,
+                limits, rule):  # fmt: skip
         """Correct lanes until all are finished, or a pivot is unsafe; return those left, and steps.
 
-        lanes, result, guards, weights, limits: see `correct_lanes`; progress: lanes left and steps
+        lanes, result, guards, weights, limits: see `correct_lanes`; moves and ratio: the step that
+        was computed last, as there, and the ratios of its pivots; progress: lanes left and steps
         taken before; guard: least ratio of the pivots; rule: longest step, steps that need not
-        shrink, and most steps.
+        shrink, and most steps. A step with an unsafe pivot is left to the caller.
         """
         z, p, dp, row, corner = lanes[2:]
+        dz, dt, index, tangent_z, tangent_t = moves
         (left, number), (longest, free, most), (rows, size) = progress, rule, z.shape
-        none, index = np.zeros(rows), np.empty(rows, np.int64)
         if dp.shape[1] == 0:  # at fixed parameters
             dp, row = np.zeros(p.shape), np.zeros((rows, size))
-        dz, tangent_z = np.empty((rows, size)), np.empty((rows, size))
-        dt, tangent_t, residual = np.empty(rows), np.empty(rows), np.empty(rows)
-        determinant, ratio, still = np.empty((rows, 2)), np.empty(rows), np.empty((0, size))
+        none, residual, determinant = np.zeros(rows), np.empty(rows), np.empty((rows, 2))
+        still = np.empty((0, size))
         while left > 0 and number < most:
             m = max(left, LANES)
             step(
@@ -137,7 +138,6 @@ def newton_of(step):
             if any_below(ratio, left, guard):
                 break
             number += 1
-            moves = (dz, dt, index, tangent_z, tangent_t)
             stage = (number <= free, number >= most, number == 1)
             left = correct_lanes(
                 moves, lanes, left, result, guards, weights, limits, longest, stage

@@ -213,7 +213,9 @@ class ClampedMechanics(PlanarMechanics):
         diagonal, gradients = np.empty((lanes, nodes)), np.empty((lanes, 2, nodes))
         out = [residual, columns, diagonal, gradients]
         over_lanes(linearise_lanes, self._matrices, given, out)
-        return LinearSystem(residual, columns, partial(self._solve, diagonal, gradients))
+        solve = partial(self._solve, diagonal, gradients)
+        null = partial(self.layout.near_null, diagonal, gradients)
+        return LinearSystem(residual, columns, solve, null)
 
     def _solve(
         self,

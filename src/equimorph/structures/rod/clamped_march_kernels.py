@@ -70,7 +70,10 @@ def search_lanes(tables, bounds, problem, steps, block, move, scratch, values, r
 
 
 @njit(**FLAGS)
-def newton_lanes(tables, guard, lanes, progress, result, guards, weights, limits, rule):
+def newton_lanes(
+    tables, guard, lanes, moves, ratio, progress, result, guards, weights, limits, rule
+):
     """Correct guesses; see `structures.newton_kernels.newton_of`."""
     work = (advance_work(tables[0][0]),)
-    return _newton(work, tables, guard, lanes, progress, result, guards, weights, limits, rule)
+    given = lanes, moves, ratio, progress, result, guards, weights, limits, rule
+    return _newton(work, tables, guard, *given)
