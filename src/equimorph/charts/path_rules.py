@@ -332,8 +332,13 @@ class _OnPath(Rule):
 
 def _first(eset: EquilibriumSet, start: Unloaded, bound: float) -> Ends:
     """First stable states on paths."""
+    # only ends count: what steps hide changes none
     options = TraceOptions(
-        through_folds=True, through_branch_points=True, record=False, locate_folds=False
+        through_folds=True,
+        through_branch_points=True,
+        record=False,
+        locate_folds=False,
+        look_inside=False,
     )
     paths = FirstStable(eset.structure, start.load, start.low, bound, eset.constraints, options)
 

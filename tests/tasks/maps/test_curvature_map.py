@@ -162,6 +162,23 @@ def test_states_end_where_paths_reconnect_at_a_branch_point(loops):
     assert reached.reshape(2, 6).sum(axis=0).tolist() == [1] * 6
 
 
+@pytest.mark.parametrize("load", ["uniform", "left-half"])
+def test_what_steps_hide_changes_no_end_of_a_path(load):
+    """Bit for bit, with steps searched and not; paths turn at up to six folds on the way."""
+    rod = em.Rod(load=load)
+    low, high = ([0.45, -0.16], [0.7, 0.24]) if load == "left-half" else ([0.2, -1.5], [1.2, 1.5])
+    settings = np.random.default_rng(5).uniform(low, high, (60, 2))
+    states = [rod.natural_state(Theta=x, Delta=y) for x, y in settings.tolist()]
+    z, p = np.stack([each.z for each in states]), np.stack([each.p for each in states])
+    within, at = (rod.max_curvature <= 20,), np.full(len(z), 2.5)
+    options = replace(TraceOptions(record=False), through_folds=True, through_branch_points=True)
+    ends = []
+    for searched in (True, False):
+        own = replace(options, look_inside=searched, locate_folds=searched)
+        ends.append(FirstStable(rod, 2, 0.0, 100.0, within, own)(z, p, at)[0])
+    np.testing.assert_array_equal(*ends)
+
+
 def test_extrema_are_equal_where_the_place_of_the_largest_changes(cmap):
     """Where Δ = 0 the arch is symmetric and its two largest curvatures mirror each other."""
     (curve,) = curves(cmap, "place")
