@@ -20,6 +20,7 @@ from equimorph.manifold import EquilibriumSet
 from equimorph.manifold.geometry.setting import Setting
 from equimorph.manifold.geometry.tangents import frames_in_embedding, split_step, tangent_frames
 from equimorph.model import Descriptor, position
+from equimorph.model.families import values_together
 from equimorph.structures import value_of
 from equimorph.tolerances import METRIC_DIFFERENCE
 
@@ -50,7 +51,7 @@ class Scalars:
 
     def __call__(self, z: Lanes, p: Parameters) -> Values:
         """Values at states."""
-        return np.stack([scalar.function(z, p) for scalar in self.scalars], axis=1)
+        return values_together([scalar.function for scalar in self.scalars], z, p)
 
 
 def solve_over_parameters(

@@ -346,6 +346,8 @@ class Cells:
 
         Equal states have equal products with any vector, so that they are neighbours in its order.
         """
+        if len(z) < 2:
+            return np.arange(len(z))
         place = embed(self.coordinates.setting, z, p)
         product = place @ np.cos(1.0 + np.arange(place.shape[1]))
         order = np.lexsort((product, hits.point))

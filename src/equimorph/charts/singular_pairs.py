@@ -35,6 +35,7 @@ from equimorph.arrays import (
     Values,
 )
 from equimorph.charts.coordinates import Coordinates, Square, settle_on_set, solve_on_the_set
+from equimorph.charts.kernels import predicted_pairs
 from equimorph.charts.location import Cells, Found
 from equimorph.columns import Columns
 from equimorph.manifold.geometry.points import VertexKind
@@ -105,7 +106,7 @@ class _Nearly:
         left, size, right = self.values
         z, p, inverse = self.states.z, self.states.p, np.zeros_like(size)
         inverse[:, :-1] = 1.0 / np.maximum(size[:, :-1], 1e-300)
-        slope = np.einsum("nkj,nk,nik->nji", right, inverse, left)
+        slope = np.einsum("nkj,nk,nik->nji", right, inverse, left, order="C")
         columns = [self._change(self.frames[:, k]) for k in range(size.shape[1])]
         first, second = (left[:, :, -1], size[:, -1]), (right[:, -1], np.stack(columns, axis=2))
         here = self.coordinates(z, p) / self.ranges
@@ -206,9 +207,10 @@ class SingularPairs:
         if len(points) == 0:
             return found
         setting, structure = self.coordinates.setting, self.cells.eset.structure
-        point, near, step = self._predict(points)
+        point, row, step, whole = self._predict(points)
         if len(point) == 0:
             return found
+        near = whole.take(row)
         tangent = np.einsum("nd,ndf->nf", step, near.frames)
         dz, dp = split_step(setting, tangent)
         rows = frames_in_embedding(setting, near.frames)
@@ -228,32 +230,13 @@ class SingularPairs:
     def _longest(self) -> float:
         return REACH * float(self.cells.sizes.max())
 
-    def _predict(self, points: Points) -> tuple[Numbers, _Bend, Places]:
-        """Points with a pair near by, the singular states it is predicted from, and the steps."""
+    def _predict(self, points: Points) -> tuple[Numbers, Numbers, Places, _Bend]:
+        """Points with a pair near by, rows of the states it is predicted from, the steps; all."""
         scaled, starts = points / self.cells.ranges, min(STARTS, len(self.vertices))
         rows, whole = self._singular(self._tree.query(scaled, k=np.arange(1, starts + 1))[1])
-        gap = np.full(rows.shape, np.inf)
-        some = (rows >= 0).nonzero()
-        gap[some] = np.linalg.norm(scaled[some[0]] - whole.values[rows[some]], axis=1)
-        chosen = gap.argsort(axis=1, kind="stable")[:, :NEIGHBOURS]
-        point, place = np.isfinite(gap[np.arange(len(points))[:, None], chosen]).nonzero()
-        row = rows[point, chosen[point, place]]
-        rest = scaled[point] - whole.values[row]
-        along, null = np.einsum("nji,ni->nj", whole.slope[row], rest), whole.null[row]
-        curvature = whole.curvature[row]
-        a, b, c = (
-            np.einsum("ni,nij,nj->n", one, curvature, other)
-            for one, other in ((null, null), (null, along), (along, along))
-        )
-        b, c = b + whole.least[row], 0.5 * c - (whole.normal[row] * rest).sum(axis=1)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            # the sign of the discriminant is not certain where it is small: Newton decides
-            half, middle = np.sqrt(np.abs(b**2 - 2.0 * a * c)) / np.abs(a), -b / a
-        steps = [along + (middle + sign * half)[:, None] * null for sign in (1.0, -1.0)]
-        good = np.max([np.linalg.norm(step, axis=1) for step in steps], axis=0) <= self._longest
-        both = np.concatenate([step[good] for step in steps])
-        own = np.tile(good.nonzero()[0], 2)
-        return point[own], whole.take(row[own]), both
+        numbers = whole.values, whole.slope, whole.normal, whole.least, whole.null, whole.curvature
+        point, row, steps = predicted_pairs(scaled, rows, *numbers, NEIGHBOURS, self._longest)
+        return point, row, steps, whole
 
 
 def pairs_of(cells: Cells) -> SingularPairs | None:

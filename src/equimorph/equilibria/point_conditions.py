@@ -15,7 +15,7 @@ import numpy as np
 from equimorph.arrays import Directions, Float, Lanes, Parameters, Scalars, Some
 from equimorph.columns import Columns
 from equimorph.equilibria.critical import Critical, Test
-from equimorph.model.descriptor import Evaluate
+from equimorph.model.families import Evaluate, values_together
 from equimorph.structures.equations import Direction
 from equimorph.structures.metric import move_length
 
@@ -153,12 +153,9 @@ class Values(Columns):
             move = Move(*onto, move.along_z, move.along_p)
 
         def excess(z: Lanes, p: Parameters) -> Scalars:
-            found = np.empty((len(z) // len(self.targets), *self.targets.shape))
-            flat = found.reshape(len(z), -1)
-            for i, function in enumerate(self.functions):
-                flat[:, i] = function(z, p)
-            found -= self.targets
-            return flat
+            shape = len(z) // len(self.targets), *self.targets.shape
+            found = values_together(self.functions, z, p).reshape(shape) - self.targets
+            return np.asarray(found.reshape(len(z), -1))
 
         return _differences(excess, at, move, self.difference, one_sided=self.one_sided)
 

@@ -13,14 +13,10 @@ from equimorph.argument_notes import QUANTITY
 from equimorph.argument_vocabulary import LARGEST
 from equimorph.arrays import Flags, Float, Lanes, Parameters, Values
 from equimorph.errors import InputError
+from equimorph.model.families import Evaluate
 from equimorph.model.obstacle import Obstacle
 from equimorph.model.rebuilding import Rebuilt, remember_call
 from equimorph.model.units import in_unit
-
-Evaluate = Callable[
-    [Lanes, Parameters],
-    Values,
-]
 
 Branches = Callable[
     [Lanes, Parameters],

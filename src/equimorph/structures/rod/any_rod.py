@@ -2,6 +2,7 @@
 
 from abc import abstractmethod
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property, wraps
 from typing import Any, ClassVar, TypeVar, cast
 
@@ -12,6 +13,7 @@ from equimorph.argument_vocabulary import SHARE
 from equimorph.arrays import Flags, Float, Lanes, Parameters, Values
 from equimorph.errors import InputError
 from equimorph.model import Constraint, Descriptor, remember_call
+from equimorph.model.families import Family, Member
 from equimorph.structures.contract import Readers, Structure, Symmetry, Written
 from equimorph.structures.equations import (
     CompiledNewton,
@@ -46,12 +48,22 @@ COORDINATES = ("x", "height", "z")
 """Names of the descriptors of coordinates."""
 _SYMBOLS = {0.5: "½", 1 / 3: "1/3", 2 / 3: "2/3", 0.25: "¼", 0.75: "¾"}
 
-Field = Callable[[Lanes, Parameters, Arclengths], Values]
-"""Values of a field, one a lane, at one arclength."""
 Peaks = Float[np.ndarray, "lanes peaks"]
 Method = TypeVar("Method", bound=Callable[..., Any])
 Branches = Callable[[Lanes, Parameters], tuple[Peaks, Peaks]]
 """Local maxima along the rod, and their arclengths."""
+
+
+@dataclass(frozen=True)
+class Coordinate:
+    """x, y or z (axis 0, 1, 2) along a rod."""
+
+    rod: "AnyRod"
+    axis: int
+
+    def __call__(self, z: Lanes, p: Parameters, s: Arclengths) -> Float[np.ndarray, "lanes points"]:
+        """Values at arclengths."""
+        return self.rod.places(z, p, s)[:, :, self.axis]
 
 
 def by_mechanics(method: Method) -> Method:
@@ -239,21 +251,16 @@ class AnyRod(HeavyRod, Refinable):
     @remember_call
     def coordinate(self, axis: int, s: float) -> Descriptor:
         """x(s), y(s) or z(s) (axis 0, 1, 2), in units of L."""
+        along = Coordinate(self, axis)
+        return self.field_at(s, COORDINATES[axis], "xyz"[axis], "length", along)
 
-        def value(z: Lanes, p: Parameters, at: Arclengths) -> Values:
-            return self.places(z, p, at)[:, 0, axis]
-
-        return self.field_at(s, COORDINATES[axis], "xyz"[axis], "length", value)
-
-    def field_at(self, s: float, name: str, symbol: str, quantity: str, field: Field) -> Descriptor:
+    def field_at(
+        self, s: float, name: str, symbol: str, quantity: str, field: Family
+    ) -> Descriptor:
         """Descriptor of a field along the rod at one arclength."""
         if not 0.0 <= s <= 1.0:  # in texts: numbers are checked before
             raise InputError(f"`s` must be {SHARE.words}; got {s!r}.")
-        at = np.array([s], float)
-
-        def value(z: Lanes, p: Parameters) -> Values:
-            return field(z, p, at)
-
+        value = Member(field, np.array([s], float))
         label, symbol = self.units.label(quantity), f"{symbol}({_SYMBOLS.get(s, f'{s:g}')})"
         return Descriptor(name_at(name, float(s)), label, value, symbol, self.signature)
 

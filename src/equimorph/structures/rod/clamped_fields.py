@@ -16,8 +16,9 @@ LOAD_DEGREE = 16
 """Degree of the polynomials by which the load is represented inside an element."""
 NEGLIGIBLE = 1e-13
 """Legendre coefficients of ρ that are smaller, relative to the largest |ρ|, are round-off."""
-KEPT = 256
-"""Arclengths whose places in the mesh are kept: descriptors ask for the same one many times."""
+KEPT, FEW = 256, 4
+"""Sets of so few arclengths whose places in the mesh are kept: descriptors ask for the same ones
+many times."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +67,7 @@ class ClampedFields:
             element, t = self.mesh.locate(s)
             side = (t > 0.5).astype(np.int64)
             found = element, side, s - self.mesh.breaks[element + side]
-            if len(s) == 1 and len(known) < KEPT:
+            if len(s) <= FEW and len(known) < KEPT:
                 known[key] = found
         return found
 

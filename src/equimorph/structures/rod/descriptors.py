@@ -12,9 +12,10 @@ from equimorph.arrays import Int, Lanes, Parameters, Values
 from equimorph.errors import InputError, MissingError
 from equimorph.model import Constraint, Descriptor, remember_call
 from equimorph.model.descriptor import Branches
+from equimorph.model.families import Family
 from equimorph.structures.contract import CompiledSteps, Readers, Written
 from equimorph.structures.rod import space
-from equimorph.structures.rod.any_rod import Field, Peaks
+from equimorph.structures.rod.any_rod import Peaks
 from equimorph.structures.rod.ends import End
 from equimorph.structures.rod.extrema import extreme_curvatures, peaks, stations
 from equimorph.structures.rod.lateral import Holding, LateralStiffness, OutOfPlane
@@ -97,9 +98,9 @@ class Described(Measured):
         """κ(s) in units of 1/L."""
         return self.field_at(s, "curvature", "κ", "curvature", self._field(1))
 
-    def _field(self, which: int) -> Field:
+    def _field(self, which: int) -> Family:
         """θ or κ (0, 1)."""
-        return lambda z, p, at: self.fields(z, p, at)[:, 0, which]
+        return lambda z, p, at: self.fields(z, p, at)[:, :, which]
 
     @cached_property
     @remember_call

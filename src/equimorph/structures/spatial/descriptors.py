@@ -11,9 +11,10 @@ from equimorph.argument_checks import check_arguments
 from equimorph.arrays import Float, Lanes, Parameters, Values, Velocity
 from equimorph.errors import InputError
 from equimorph.model import Descriptor, remember_call
+from equimorph.model.families import Family
 from equimorph.structures.contract import Written
 from equimorph.structures.material_points import MaterialPoints
-from equimorph.structures.rod.any_rod import Field, Peaks
+from equimorph.structures.rod.any_rod import Peaks
 from equimorph.structures.rod.arclengths import Arclengths, arclengths
 from equimorph.structures.rod.centreline import Centreline
 from equimorph.structures.rod.extrema import peaks, stations
@@ -133,13 +134,13 @@ class DescribedInSpace(StressedRod):
 
     @remember_call
     def _angle(self, name: str, s: float) -> Descriptor:
-        def value(z: Lanes, p: Parameters, at: Arclengths) -> Values:
-            r = self.frames(z, p, at)[:, 0]
+        def value(z: Lanes, p: Parameters, at: Arclengths) -> Float[np.ndarray, "lanes points"]:
+            r = self.frames(z, p, at)
             if name == "turn":
-                return np.asarray(np.arctan2(r[:, 1, 0], r[:, 0, 0]))
+                return np.asarray(np.arctan2(r[..., 1, 0], r[..., 0, 0]))
             if name == "tilt":
-                return np.asarray(-np.arcsin(np.clip(r[:, 2, 0], -1.0, 1.0)))
-            return np.asarray(np.arctan2(r[:, 2, 1], r[:, 2, 2]))
+                return np.asarray(-np.arcsin(np.clip(r[..., 2, 0], -1.0, 1.0)))
+            return np.asarray(np.arctan2(r[..., 2, 1], r[..., 2, 2]))
 
         return self.field_at(s, name, ANGLES[name], "angle", value)
 
@@ -152,7 +153,7 @@ class DescribedInSpace(StressedRod):
     @remember_call
     def _strain(self, name: str, s: float) -> Descriptor:
         axis = tuple(STRAINS).index(name)
-        field: Field = lambda z, p, at: self.fields(z, p, at).strains[:, 0, axis]  # noqa: E731
+        field: Family = lambda z, p, at: self.fields(z, p, at).strains[:, :, axis]  # noqa: E731
         return self.field_at(s, name, STRAINS[name], "curvature", field)
 
     @check_arguments
@@ -160,9 +161,9 @@ class DescribedInSpace(StressedRod):
     def bending(self, s: float) -> Descriptor:
         """Bending curvature √(κ_n² + κ_b²) at s, in units of 1/L."""
 
-        def size(z: Lanes, p: Parameters, at: Arclengths) -> Values:
+        def size(z: Lanes, p: Parameters, at: Arclengths) -> Float[np.ndarray, "lanes points"]:
             strains = self.fields(z, p, at).strains
-            return np.asarray(np.hypot(strains[:, 0, 1], strains[:, 0, 2]))
+            return np.asarray(np.hypot(strains[:, :, 1], strains[:, :, 2]))
 
         return self.field_at(s, "bending", "|κ|", "curvature", size)
 

@@ -21,6 +21,7 @@ from equimorph.manifold.geometry.topology import faces_of, pieces
 from equimorph.manifold.lookup.cell_index import CellIndex, Hits
 from equimorph.manifold.queries.nearest import SetPoints, local_minima, points_at_vertices
 from equimorph.model import Constraint, Descriptor, function_of
+from equimorph.model.families import values_together
 from equimorph.structures import States, join_states
 from equimorph.structures.metric import metric_coordinates
 from equimorph.tasks.optimising.programme import Objective, Programme
@@ -65,7 +66,8 @@ class Predictor:
     def values(self) -> Float[np.ndarray, "V k"]:
         """Values at the vertices."""
         points = self.eset.points
-        return np.stack([each.function(points.z, points.p) for each in self.descriptors], axis=1)
+        functions = [each.function for each in self.descriptors]
+        return values_together(functions, points.z, points.p)
 
     @cached_property
     def spread(self) -> Float[np.ndarray, " k"]:
