@@ -176,6 +176,7 @@ class CondensedLayout:
             x[refined], good = self._refine([a[refined] for a in arrays], x[refined])
             pivoted[doubtful] = True
             pivoted[refined[good]] = False
+        if pivoted.any():
             full = [a[pivoted] for a in arrays]
             matrices = self.dense(full[0], full[1], full[6], (full[7], full[8]))
             again = solve_bordered(matrices, *full[2:6])
