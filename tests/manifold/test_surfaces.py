@@ -6,6 +6,7 @@ from hypothesis import given, strategies as st
 
 from draws import few
 from equimorph.manifold import build, equilibrium_set
+from equimorph.manifold.lifting import completeness
 from equimorph.manifold.lifting.seeds import seeds
 from equimorph.model import Box, Descriptor
 from oracles.complexes import assert_faithful, assert_folds_are_singular
@@ -111,6 +112,28 @@ def test_sheets_that_the_seeds_lack_are_found_by_the_checks(monkeypatch):
     assert topology(eset) == (3, 3, 3)
     assert eset.audit.recovered >= 2
     assert eset.audit.clean
+
+
+def test_all_points_are_searched_once_nothing_is_missing(monkeypatch):
+    """Of eight points two come first; where something is missing there, the others wait."""
+    searched = []
+
+    def counted(eset, places, seed):
+        found = search(eset, places, seed)
+        searched.append((len(places), len(found.missing)))
+        return found
+
+    search = completeness._searched
+    monkeypatch.setattr(completeness, "_searched", counted)
+    monkeypatch.setattr(build, "seeds", lambda *given: tuple(each[:1] for each in seeds(*given)))
+    eset = lifted(three_sheets(), Box(a=(-2, 1), b=(-1.5, 1.5)), intervals=(4, 5), checks=8)
+    assert eset.audit.clean
+    *before, first, last = searched
+    assert before
+    assert all(points == 2 for points, _ in before)
+    assert before[0][1] > 0
+    assert (first, last) == ((2, 0), (6, 0))
+    assert eset.audit.starts == 8 * 3 * 67
 
 
 def island(radius: float, places: tuple[float, ...]) -> Polynomial:

@@ -103,8 +103,8 @@ def equilibrium_set(  # noqa: PLR0913  # the knobs of the public face, most by k
         search looks for equilibria that the set lacks; four times as many in diagrams over one
         parameter and in symmetric slices. In addition, Newton's method starts from 2000 random
         states, each over a different point. Equilibria found in this way are lifted like seeds and
-        new points are checked, until nothing is missing or ten rounds are over. 0 disables all
-        checks.
+        new points are checked, until nothing is missing at all points or ten rounds are over. Of
+        more than two points a quarter is checked first. 0 disables all checks.
     accuracy
         Largest distance of the straight cells from the set, in the metric, to which the set is
         refined (see `refine`); without it, the set is not refined. If some edges cannot be bisected

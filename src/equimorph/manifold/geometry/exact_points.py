@@ -162,6 +162,7 @@ def correct_points(
     around: Values,
     lower: Numbers | None = None,
     index: Numbers | None = None,
+    iterations: int = Guards.iterations,
 ) -> Pinned:
     """Points that are sought, from guesses.
 
@@ -175,8 +176,10 @@ def correct_points(
         another fold may be met.
     index
         Index of the sheet, if it is known: far from the guess, that of another may be met.
+    iterations
+        Corrections, at most: a guess that is close needs few.
     """
-    found = _settle_guarded(aim, z, p, around, lower, index)
+    found = _settle_guarded(aim, z, p, around, lower, index, iterations=iterations)
     good = found.found
     if aim.crossing:
         good[good] = _crosses(aim.take(np.flatnonzero(good)), found.z[good], found.p[good])
@@ -213,11 +216,13 @@ def _settle_guarded(
     lower: Numbers | None,
     index: Numbers | None,
     following: float = FOLLOWING,
+    iterations: int = Guards.iterations,
 ) -> Settled:
     """Newton's method with the guards of the set."""
     setting, centre = aim.setting, aim.centre(p)
     tangents = aim.rows if aim.plain else aim.tangents
     guards = Guards(
+        iterations=iterations,
         longest=LONGEST,
         converged=LAST,
         following=following,
