@@ -25,7 +25,7 @@ from equimorph.manifold.geometry.topology import (
     labels,
     orientation,
 )
-from equimorph.manifold.lifting import balls, cells
+from equimorph.manifold.lifting import cells, inner_points
 from equimorph.manifold.lifting.cells import volumes_over
 from equimorph.manifold.refining.quality import qualities, smallest_angles
 from equimorph.model import Box, Descriptor
@@ -148,27 +148,27 @@ def pinned_one_by_one(setting, points, groups, kind, span, frames):
     z, p, _ = middles(setting, points, groups)
     found = np.zeros(len(groups), bool)
     for lane, group in enumerate(groups):
-        best = -np.inf if kind == VertexKind.FOLD else balls.ON_FACE
-        members = range(min(len(group), balls.TRIED))
-        for share, member in [(0.0, 0), *product(balls.SHARES, members)]:
+        best = -np.inf if kind == VertexKind.FOLD else inner_points.ON_FACE
+        members = range(min(len(group), inner_points.TRIED))
+        for share, member in [(0.0, 0), *product(inner_points.SHARES, members)]:
             tried = pin(setting, points, [group], kind, span[[lane]], np.array([member]), share)
             depth = shares_in(frames[[lane]], tried.p[:, setting.free]).min()
             if tried.found[0] and depth > best:
                 z[lane], p[lane], best, found[lane] = tried.z[0], tried.p[0], depth, True
-            if best > balls.ON_FACE:
+            if best > inner_points.ON_FACE:
                 break
     return Pinned(z, p, found)
 
 
 def test_points_that_are_tried_together_are_those_of_one_try_after_the_other(monkeypatch):
     """Around a curve of cusps, where folds bulge beyond their cells, and some are lost."""
-    asked, compute = [], balls.pin_in_cells
+    asked, compute = [], inner_points.pin_in_cells
 
     def both(*given):
         asked.append((compute(*given), pinned_one_by_one(*given)))
         return asked[-1][0]
 
-    monkeypatch.setattr(balls, "pin_in_cells", both)
+    monkeypatch.setattr(inner_points, "pin_in_cells", both)
     lifted(ridge(), BOX, (3, 3, 3))
     assert sum(len(each.found) for each, _ in asked) > 20
     for together, alone in asked:

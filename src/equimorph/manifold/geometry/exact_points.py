@@ -163,6 +163,7 @@ def correct_points(
     lower: Numbers | None = None,
     index: Numbers | None = None,
     iterations: int = Guards.iterations,
+    contraction: float = np.inf,
 ) -> Pinned:
     """Points that are sought, from guesses.
 
@@ -178,8 +179,13 @@ def correct_points(
         Index of the sheet, if it is known: far from the guess, that of another may be met.
     iterations
         Corrections, at most: a guess that is close needs few.
+    contraction
+        Length of a step, in that of the one before, beyond which none is taken: across a kink of a
+        constraint steps are as long as the ones before.
     """
-    found = _settle_guarded(aim, z, p, around, lower, index, iterations=iterations)
+    found = _settle_guarded(
+        aim, z, p, around, lower, index, iterations=iterations, contraction=contraction
+    )
     good = found.found
     if aim.crossing:
         good[good] = _crosses(aim.take(np.flatnonzero(good)), found.z[good], found.p[good])
@@ -217,6 +223,7 @@ def _settle_guarded(
     index: Numbers | None,
     following: float = FOLLOWING,
     iterations: int = Guards.iterations,
+    contraction: float = np.inf,
 ) -> Settled:
     """Newton's method with the guards of the set."""
     setting, centre = aim.setting, aim.centre(p)
@@ -226,6 +233,7 @@ def _settle_guarded(
         longest=LONGEST,
         converged=LAST,
         following=following,
+        contraction=contraction,
         trust=REACH * around + 1e-3,
         middle=centre,
         lower_index=lower,

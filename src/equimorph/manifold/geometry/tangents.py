@@ -303,3 +303,13 @@ def fold_forms(setting: Setting, z: Lanes, p: Parameters) -> FoldForms:
         dp[:, free[k]] = setting.scales[k]
         slope[:, k] = np.einsum("li,li->l", phi, structure.parameter_derivative(z, p, dp))
     return FoldForms(phi, slope, bend)
+
+
+def fold_rows(setting: Setting, forms: FoldForms) -> Rows:
+    """Tangent spaces at points on folds: along null vectors, and along folds in the parameters."""
+    (lanes, d), n = forms.slope.shape, setting.structure.unknowns
+    rows = np.zeros((lanes, d, n + d))
+    rows[:, 0, :n] = metric_coordinates(setting.structure, forms.null)
+    rows[:, 1:, n:] = np.linalg.svd(forms.slope[:, None])[2][:, 1:]
+    rows[:, 0] /= np.linalg.norm(rows[:, 0], axis=1, keepdims=True)
+    return rows

@@ -5,17 +5,15 @@ from itertools import pairwise, starmap
 
 import numpy as np
 
-from equimorph.arrays import Bool, Float, Int, Items, Pairs, Triples
-from equimorph.manifold.geometry.exact_points import pin
+from equimorph.arrays import Bool, Int, Items, Pairs, Triples
 from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.setting import embed
-from equimorph.manifold.geometry.simplices import shares_in
 from equimorph.manifold.geometry.topology import flags_of, keys_of, rows_of
+from equimorph.manifold.lifting.constraint_sides import close_along_constraints
 from equimorph.manifold.lifting.crossing_branches import lonely
 from equimorph.manifold.lifting.crossing_discs import (
     Group,
     join_crossings,
-    pin_ends,
     put_hubs,
     split_crossings,
 )
@@ -24,6 +22,7 @@ from equimorph.manifold.lifting.fold_ways import followed_ways, ways_to_join
 from equimorph.manifold.lifting.loops import Loops
 from equimorph.manifold.lifting.pairing import Pairing
 from equimorph.manifold.lifting.patterns import cut_by_pattern
+from equimorph.manifold.lifting.pins import groups_of, pin_groups
 from equimorph.manifold.lifting.polygon_cuts import (
     MEETING,
     SINGULAR,
@@ -35,15 +34,10 @@ from equimorph.manifold.lifting.polygon_cuts import (
     chord_of,
     chords_to_split,
     cut,
-    planes,
     triangulate,
 )
 from equimorph.manifold.lifting.polygons import Polygon
 from equimorph.model import are_feasible
-
-BULGE = 0.2
-"""How far corners may lie beyond a side of their grid triangle, as a barycentric coordinate: on
-coarse grids folds and constraints bulge so far; tips of strips lie further away."""
 
 
 @dataclass(frozen=True)
@@ -156,67 +150,12 @@ def _plan(pairing: Pairing, polygon: Polygon) -> Plan:
     return Plan(polygon, list(polygon.points), sides, kinds)
 
 
-def _same_side(plan: Plan, chord: Chord) -> bool:
-    """Whether two points lie on one side of the grid triangle."""
-    first, second = plan.on(chord)
-    return bool(first & second)
-
-
 def _close(pairing: Pairing, plans: list[Plan], found: _Found) -> None:
-    """Close open polygons along the constraint, through a corner if a singular curve leaves there.
-
-    That is a fold, or where another sheet crosses.
-    """
-    for plan in (plan for plan in plans if plan.polygon.gap):
-        side = (plan.points[plan.polygon.gap - 1], plan.points[plan.polygon.gap])
-        found.caps.add(chord_of(*side))
-        if _same_side(plan, side):
-            found.undecided.add(plan.polygon.triangle)
-    through = {k: _through(plan) for k, plan in enumerate(plans) if plan.polygon.open}
-    found.caps.update(
-        chord_of(plans[k].points[0], plans[k].points[-1]) for k, kind in through.items() if not kind
-    )
-    open_plans = [plans[k] for k, kind in through.items() if kind]
-    kinds = [kind for kind in through.values() if kind]
-    ends = [(plan.points[0], plan.points[-1]) for plan in open_plans]
-    extra = _pin(pairing, _groups(open_plans, ends), kinds)
-    crossing = [k for k, kind in enumerate(kinds) if kind == VertexKind.CROSSING]
-    met = pin_ends(pairing, [open_plans[k] for k in crossing])
-    for k, point in zip(crossing, met, strict=True):
-        extra[k] = point
-    _add_corners(pairing, open_plans, extra)
-    for plan, point in zip(open_plans, extra, strict=True):
-        if point is None:
-            found.undecided.add(plan.polygon.triangle)
-            if len(folds := plan.those(TURN)) == 1:
-                chain = plan.points[0], plan.points[-1]
-                found.astray.append((plan.polygon.triangle, folds[0], *chain))
-            continue
-        found.caps.update({chord_of(plan.points[0], point), chord_of(plan.points[-1], point)})
-        plan.append(point, int(pairing.points.kind[point]))
-
-
-def _add_corners(pairing: Pairing, plans: list[Plan], extra: list[int | None]) -> None:
-    """Corners that were not found between the ends of polygons, along their folds."""
-    folds = [plan.those(TURN) for plan in plans]
-    lost = [k for k, own in enumerate(folds) if extra[k] is None and len(own) == 1]
-    pairs = [(plans[k].polygon.triangle, folds[k][0]) for k in lost]
-    for k, exit_ in zip(lost, fold_exits(pairing, pairs), strict=True):
-        if exit_ is not None and exit_.edge < 0:
-            low = int(pairing.points.index[folds[k][0]])
-            extra[k] = pairing.points.add(exit_.z, exit_.p, low, VertexKind.CORNER)
-
-
-def _through(plan: Plan) -> int:
-    """Kind of the point through which an open polygon is closed; 0 for none.
-
-    Where the ends of a fold and of a crossing are both missing, no point is found.
-    """
-    if len(plan.those(TURN)) % 2:
-        return VertexKind.CORNER
-    if len(plan.those(MEETING)) % 2:
-        return VertexKind.CROSSING
-    return VertexKind.CAP if _same_side(plan, (plan.points[0], plan.points[-1])) else 0
+    """Close open polygons along the constraint."""
+    closed = close_along_constraints(pairing, plans)
+    found.caps |= closed.caps
+    found.undecided |= closed.undecided
+    found.astray.extend(closed.astray)
 
 
 def _join_folds(pairing: Pairing, plans: list[Plan], found: _Found) -> list[Plan]:
@@ -262,8 +201,8 @@ def _split_chords(pairing: Pairing, plans: list[Plan], found: _Found) -> None:
         if chord not in pairing.tips
     ]
     folds = [(plan, chord) for plan, chord in blocked if plan.singular(chord[0]) == TURN]
-    groups = _groups([plan for plan, _ in folds], [chord for _, chord in folds])
-    extra = _pin(pairing, groups, [VertexKind.FOLD] * len(folds))
+    groups = groups_of([plan for plan, _ in folds], [chord for _, chord in folds])
+    extra = pin_groups(pairing, groups, [VertexKind.FOLD] * len(folds))
     _follow_lost(pairing, groups, extra)
     for (plan, chord), point in zip(folds, extra, strict=True):
         if point is None:
@@ -306,43 +245,6 @@ def _chords_to_split(plan: Plan) -> list[Chord]:
     chords = {chord_of(place[a], place[b]): (a, b) for a, b in plan.chords if {a, b} <= set(place)}
     chosen = chords_to_split(tuple(plan.on(plan.points)), tuple(chords))
     return [chords[chord] for chord in chosen]
-
-
-def _groups(plans: list[Plan], pairs: list[Chord]) -> list[Group]:
-    return [Group(plan.polygon.triangle, pair) for plan, pair in zip(plans, pairs, strict=True)]
-
-
-def _pin(pairing: Pairing, pairs: list[Group], kinds: list[int]) -> list[int | None]:
-    """Numbers of new exact points of given kinds between pairs; None where none was found."""
-    out: list[int | None] = [None] * len(pairs)
-    for kind in (VertexKind.FOLD, VertexKind.CAP, VertexKind.CORNER):
-        own = [k for k, each in enumerate(kinds) if each == kind]
-        if not own:
-            continue
-        ends = [pairs[k].points for k in own]
-        span = planes(pairing, [pairs[k].triangle for k in own])
-        pinned = pin(pairing.setting, pairing.points, ends, kind, span)
-        good = pinned.found & _are_inside(pairing, [pairs[k].triangle for k in own], kind, pinned.p)
-        lows = pairing.points.index[np.array(ends)].min(axis=1)
-        for lane, low in zip(np.flatnonzero(good).tolist(), lows[good].tolist(), strict=True):
-            out[own[lane]] = pairing.points.add(pinned.z[lane], pinned.p[lane], low, kind)
-    return out
-
-
-def _are_inside(
-    pairing: Pairing, triangles: list[int], kind: int, p: Float[np.ndarray, "n P"]
-) -> Bool[np.ndarray, " n"]:
-    """Which points are in the box, and, if they are corners, over their own grid triangles or near.
-
-    Folds and constraints bulge beyond sides. But where a strip between them leads on to a corner
-    further away, it may pass other vertices before.
-    """
-    mesh, places = pairing.mesh, p[:, pairing.setting.free]
-    inside = mesh.covers(places)
-    if kind == VertexKind.CORNER:
-        corners = mesh.vertices[mesh.triangles[triangles]]
-        inside &= shares_in(corners, places).min(axis=1) > -BULGE
-    return inside
 
 
 @dataclass(frozen=True)

@@ -7,11 +7,14 @@ vertex knows. But in a triangle that sees the layer on another side, the fold le
 See docs/decisions.md, "Strips between a fold and a constraint are led along".
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from equimorph.arrays import Int, Items, Lanes, Parameters, Place
 from equimorph.equilibria.critical import null_border
 from equimorph.manifold.geometry.points import VertexKind
+from equimorph.manifold.lifting.cap_walks import cap_at, cap_exits
 from equimorph.manifold.lifting.cells import CellFinder, Cells, Close
 from equimorph.manifold.lifting.crossing_branches import (
     HALVES,
@@ -40,11 +43,55 @@ def find_through_layers(
 
 
 def _enter_layers(pairing: Pairing, astray: Int[np.ndarray, "a 4"]) -> bool:
-    """Enter the arcs to which folds lead out of triangles; whether anything new is known.
+    """Enter the arcs to which folds and constraints lead out of triangles; whether any are new.
 
     `astray`: see `Discs`. What was tried in vain is not tried again.
     """
-    pairs = [(triangle, fold) for triangle, fold in np.unique(astray[:, :2], axis=0).tolist()]
+    on_fold = pairing.points.kind[astray[:, 1]] != VertexKind.CAP
+    pairs, caps = (
+        [(triangle, point) for triangle, point in np.unique(own[:, :2], axis=0).tolist()]
+        for own in (astray[on_fold], astray[~on_fold])
+    )
+    # both in any case
+    return any([_enter_at_folds(pairing, pairs), _enter_at_constraints(pairing, caps)])
+
+
+def _enter_at_constraints(pairing: Pairing, pairs: Sequence[tuple[int, int]]) -> bool:
+    """Enter what lies over edges behind unknown points on constraints, from these on."""
+    exits = [each for each in cap_exits(pairing, pairs) if each is not None]
+    new = [each for each in exits if cap_at(pairing, each) < 0]
+    if not new:
+        return False
+    edge, z, p = (np.array([getattr(each, name) for each in new]) for name in ("edge", "z", "p"))
+    owner, sense = np.divmod(np.arange(HALVES * len(z)), HALVES)
+    line = edge_lines(pairing, edge)
+    t = np.array([_share(pairing, *each) for each in zip(edge.tolist(), p, strict=True)])
+    one = np.ones(len(z))
+    along = line.advance(z, t, np.zeros_like(z), one, 0.0 * one).tangent_z
+    norm = np.hypot(metric_length(pairing.setting.structure, along), line.weight)
+    sign = np.where(sense, -1.0, 1.0)
+    tangents = (sign / norm[owner])[:, None] * along[owner], sign / norm[owner]
+    lines = line.take(owner)
+    halves, front = first_steps(pairing, lines, z[owner], p[owner], tangents)
+    seeds, met, _ = lead_out(pairing, halves, edge[owner[halves]], lines.take(halves), front)
+    count = pairing.points.count
+    pairing.points.over_vertices(*seeds)
+    index = pairing.setting.structure.index(z, p)
+    for half in np.unique(met.lanes[met.kinds == VertexKind.CAP]).tolist():
+        own, k = met.take(met.lanes == half), half // HALVES
+        if cap_at(pairing, new[k]) < 0 and VertexKind.CROSSING not in own.kinds:
+            start = pairing.points.add(z[k], p[k], int(index[k]), VertexKind.CAP, int(edge[k]))
+            rest = pairing.points.add_many(own.z, own.p, own.index, own.kinds, int(edge[k]))
+            pairing.arcs.setdefault(int(edge[k]), []).append((start, *rest.tolist()))
+    pairing.fit()
+    for key, each in pairing.cap_exits.items():
+        if each is not None and cap_at(pairing, each) < 0:
+            pairing.cap_exits[key] = None
+    return pairing.points.count > count
+
+
+def _enter_at_folds(pairing: Pairing, pairs: Sequence[tuple[int, int]]) -> bool:
+    """Enter what lies over edges beside unknown folds, from these on."""
     exits = [each for each in fold_exits(pairing, pairs) if each is not None]
     new = [each for each in exits if each.edge >= 0 and fold_at(pairing, each) < 0]
     kept: list[FoldExit] = []

@@ -17,9 +17,9 @@ from equimorph.linalg.lanes import results_of
 from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.setting import embed
 from equimorph.manifold.geometry.tangents import cap_normals, frames_in_embedding, tangent_frames
+from equimorph.manifold.lifting.cap_walks import link
 from equimorph.manifold.lifting.courses import Courses
 from equimorph.manifold.lifting.kernels import close_loops, find_plain_loops
-from equimorph.manifold.lifting.layer_chains import join_layers
 from equimorph.manifold.lifting.pairing import Pairing
 from equimorph.manifold.lifting.polygons import Polygon, Polygons
 
@@ -61,12 +61,38 @@ def find_loops(pairing: Pairing, wanted: Bool[np.ndarray, " T"] | None = None) -
     chains = np.bincount(polygons.triangle[polygons.open], minlength=len(pairing.mesh.triangles))
     several = chains > 1
     several[_with_arc(pairing)] = True
+    single = np.flatnonzero(polygons.open & ~several[polygons.triangle])
+    several[polygons.triangle[single[_are_bent(pairing, polygons, single)]]] = True
     rows = np.flatnonzero(several[polygons.triangle])
     layers = _over_layers(pairing, triangles[several[triangles]])
     found = sorted([*polygons.each(rows), *layers], key=attrgetter("triangle"))
     special, ambiguous, unjoined, astray = _decide(pairing, found)
     alone = _alone(polygons, ~several[polygons.triangle])
     return Loops(plain, owner, alone, special, ambiguous, [*broken.tolist(), *unjoined], astray)
+
+
+def _are_bent(pairing: Pairing, polygons: Polygons, chains: Some) -> Bool[np.ndarray, " n"]:
+    """Whether constraints do not lead straight from one end of open chains to the other.
+
+    They may take turns there, or lead out of the triangle and back into it. Where ends differ in
+    their index a fold leads out, where sheets cross, these do.
+    """
+    store, setting = pairing.points, pairing.setting
+    ends = polygons.points[np.stack([polygons.starts[chains], polygons.starts[chains + 1] - 1], 1)]
+    bent = np.zeros(len(ends), bool)
+    plain = np.flatnonzero(
+        (store.index[ends[:, 0]] == store.index[ends[:, 1]])
+        & (store.kind[ends] == VertexKind.CAP).all(axis=1)
+    )
+    if len(plain) == 0 or len(setting.free) == 1:
+        return bent
+    own = ends[plain]
+    normals = cap_normals(setting, store.z[own.ravel()], store.p[own.ravel()])
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+    triangle = polygons.triangle[chains[plain]]
+    courses = Courses.of(pairing, own, triangle, normals.reshape(*own.shape, -1))
+    bent[plain] = ~(courses.cosines > STRAIGHT).all(axis=1)
+    return bent
 
 
 def _over_layers(pairing: Pairing, triangles: Items) -> list[Polygon]:
@@ -96,8 +122,7 @@ def _close(
         triangles, mesh.triangles, mesh.sides, mesh.edges, *known, curves.start, curves.end,
         np.cumsum(inner), np.array(in_order, int), plain, rows,
     )  # fmt: skip
-    nothing = np.zeros(len(triangle), int)
-    return Polygons(flat, starts, triangle, is_open > 0, nothing), triangles[broken]
+    return Polygons(flat, starts, triangle, is_open > 0), triangles[broken]
 
 
 def _alone(polygons: Polygons, kept: ItemFlags) -> Polygons:
@@ -108,7 +133,6 @@ def _alone(polygons: Polygons, kept: ItemFlags) -> Polygons:
         np.concatenate([[0], np.cumsum(lengths[kept])]),
         polygons.triangle[kept],
         polygons.open[kept],
-        polygons.gap[kept],
     )
 
 
@@ -130,7 +154,7 @@ def _decide(
     And folds that lead out of triangles where no curve is known.
     """
     decided: list[Polygon] = []
-    ambiguous: list[int] = []
+    unclear: dict[int, list[Polygon]] = {}
     broken: list[int] = []
     lost: list[Astray] = []
     groups: dict[int, list[Polygon]] = {}
@@ -141,17 +165,45 @@ def _decide(
         else:
             groups[triangle] = [polygon for polygon in found if polygon is not None]
             decided.extend(joined)
-    for triangle, layers in join_layers(pairing, groups).items():
-        chains = [polygon for polygon in layers.left if polygon.open]
-        lost.extend(layers.astray)
-        doubt = layers.unclear or len(layers.astray) > 0
-        if doubt or (len(chains) > 1 and not _closes_alone(pairing, chains)):
-            ambiguous.append(triangle)
+    for triangle, every in groups.items():
+        chains = [polygon for polygon in every if polygon.open]
+        sure = len(chains) == 0 or (
+            _closes_alone(pairing, chains)
+            if len(chains) > 1
+            else not _are_bent(pairing, Polygons.of(chains), np.zeros(1, int))[0]
+        )
+        if not sure:
+            unclear[triangle] = every
         else:
-            decided.extend([*layers.left, *layers.told])
+            decided.extend(every)
+    linked, astray = _linked(pairing, unclear)
+    lost.extend(astray)
+    decided.extend(linked)
+    ambiguous = sorted(set(unclear) - {polygon.triangle for polygon in linked})
     undecided = set(ambiguous)
     decided = [polygon for polygon in decided if polygon.triangle not in undecided]
     return decided, ambiguous, broken, lost
+
+
+def _linked(
+    pairing: Pairing, unclear: dict[int, list[Polygon]]
+) -> tuple[list[Polygon], list[Astray]]:
+    """Polygons over those triangles on which constraints lead from end to end; and what is astray.
+
+    Where sheets cross, these are not followed.
+    """
+    chains = {
+        triangle: [polygon for polygon in own if polygon.open]
+        for triangle, own in unclear.items()
+        if not any(_crossings(pairing, polygon) for polygon in own)
+    }
+    polygons, lost = list[Polygon](), list[Astray]()
+    for triangle, linked in link(pairing, chains).items():
+        lost.extend(linked.astray)
+        if linked.polygons is not None:
+            closed = [polygon for polygon in unclear[triangle] if not polygon.open]
+            polygons.extend([*closed, *linked.polygons])
+    return polygons, lost
 
 
 def _with_arcs(
@@ -201,7 +253,7 @@ def _join_chains(pairing: Pairing, first: Polygon, second: Polygon) -> Polygon:
     gap = np.linalg.norm(place[:2, None] - place[None, 2:], axis=2)
     turned = gap[1, 1] + gap[0, 0] < gap[1, 0] + gap[0, 1]
     points = (*chain[0], *(reversed(chain[1]) if turned else chain[1]))
-    return Polygon(first.triangle, points, True, gap=len(chain[0]))
+    return Polygon(first.triangle, points, True, (len(chain[0]),))
 
 
 def _closes_alone(pairing: Pairing, chains: list[Polygon]) -> bool:
@@ -213,31 +265,8 @@ def _closes_alone(pairing: Pairing, chains: list[Polygon]) -> bool:
     crossings = [_crossings(pairing, chain) for chain in chains]
     if len(chains) == 2 and crossings[0] and crossings[0] == crossings[1]:
         return True
-    rules = (_close_themselves, _on_own_sheets, _lead_to_themselves)
+    rules = (_close_themselves, _on_own_sheets)[: 2 if any(crossings) else 1]
     return any(rule(pairing, chains) for rule in rules)
-
-
-def _lead_to_themselves(pairing: Pairing, chains: list[Polygon]) -> bool:
-    """Whether the constraint leads from each chain's ends to each other, and to no other chain.
-
-    It leads along a sheet of one index, unless a fold meets it: to this fold at most one chain may
-    lead, with ends of two indices. Another sheet of the same index must lie aside.
-    """
-    store, setting = pairing.points, pairing.setting
-    ends = np.array([(chain.points[0], chain.points[-1]) for chain in chains])
-    index = store.index[ends]
-    plain = index[:, 0] == index[:, 1]
-    if np.count_nonzero(~plain) > 1:
-        return False
-    normals = cap_normals(setting, store.z[ends.ravel()], store.p[ends.ravel()])
-    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
-    triangle = np.full(np.count_nonzero(plain), chains[0].triangle)
-    courses = Courses.of(pairing, ends[plain], triangle, normals.reshape(*ends.shape, -1)[plain])
-    if not (courses.cosines > STRAIGHT).all():
-        return False
-    off, own = _slopes_to(pairing, ends.ravel())
-    rival = ~own & (index.ravel()[:, None] == index.ravel())
-    return bool((np.maximum(off, off.T)[rival] > ASIDE).all())
 
 
 def _on_own_sheets(pairing: Pairing, chains: list[Polygon]) -> bool:

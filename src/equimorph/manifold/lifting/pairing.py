@@ -122,6 +122,18 @@ class FoldExit(NamedTuple):
     inside: tuple[Float[np.ndarray, " size"], Float[np.ndarray, " parameters"]] | None
 
 
+class CapExit(NamedTuple):
+    """State at which a constraint leaves a grid triangle, and the edge over which it lies.
+
+    way: z, p and index of the states that were passed, with the first and the last one.
+    """
+
+    edge: int
+    z: Float[np.ndarray, " size"]
+    p: Float[np.ndarray, " parameters"]
+    way: list[tuple[Float[np.ndarray, " size"], Float[np.ndarray, " parameters"], int]]
+
+
 @dataclass
 class Pairing:
     """Everything known while the set is being lifted."""
@@ -149,6 +161,8 @@ class Pairing:
     exits: dict[tuple[int, ...], FoldExit | None] = field(default_factory=dict)
     """Where folds leave triangles, by the corners of these and the fold, as far as that was asked
     for."""
+    cap_exits: dict[tuple[int, ...], CapExit | None] = field(default_factory=dict)
+    """Where constraints leave triangles, likewise."""
     hubs: dict[tuple[int, int], int] = field(default_factory=dict)
     """Points between two of these at which a fold of one of the sheets crosses, too."""
     tips: dict[tuple[int, int], int] = field(default_factory=dict)

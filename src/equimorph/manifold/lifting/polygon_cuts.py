@@ -282,10 +282,10 @@ class Plan:
         """Singular points of a sort."""
         return [point for point in self.points if self.singular(point) == singular]
 
-    def append(self, point: int, kind: int) -> None:
-        """Close the polygon through an extra point."""
-        self.points.append(point)
-        self.kinds[point] = kind
+    def insert(self, place: int, points: Sequence[int], kinds: Sequence[int]) -> None:
+        """Lead the side that ends at a place through extra points."""
+        self.points[place:place] = points
+        self.kinds.update(zip(points, kinds, strict=True))
 
     def on(self, points: Sequence[int]) -> list[int]:
         """Sides on which points lie; all points of a chord with others on it count as on one."""

@@ -13,13 +13,14 @@ class Polygon:
     """Boundary of a disc over one triangle: points in order; `open` if closed along a constraint.
 
     An open polygon runs from its first to its last point; the closing side lies on the constraint.
-    So does, if it consists of two chains, the side that ends at the place `gap` among its points.
+    So do, if it consists of several chains, the sides that end at the places `gaps` among its
+    points.
     """
 
     triangle: int
     points: tuple[int, ...]
     open: bool
-    gap: int = 0
+    gaps: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -30,7 +31,6 @@ class Polygons:
     starts: Int[np.ndarray, " n1"]
     triangle: Items
     open: ItemFlags
-    gap: Items
 
     @classmethod
     def of(cls, polygons: Sequence[Polygon]) -> "Polygons":
@@ -41,17 +41,15 @@ class Polygons:
             np.concatenate([[0], np.cumsum(np.array(lengths, int))]),
             np.array([each.triangle for each in polygons], int),
             np.array([each.open for each in polygons], bool),
-            np.array([each.gap for each in polygons], int),
         )
 
     def each(self, rows: Some) -> list[Polygon]:
         """Some of the polygons as records."""
         return [
-            Polygon(triangle, tuple(self.points[first:last].tolist()), is_open, gap)
-            for triangle, first, last, is_open, gap in zip(
+            Polygon(triangle, tuple(self.points[first:last].tolist()), is_open)
+            for triangle, first, last, is_open in zip(
                 self.triangle[rows].tolist(), self.starts[rows].tolist(),
-                self.starts[rows + 1].tolist(), self.open[rows].tolist(), self.gap[rows].tolist(),
-                strict=True,
+                self.starts[rows + 1].tolist(), self.open[rows].tolist(), strict=True,
             )
         ]  # fmt: skip
 

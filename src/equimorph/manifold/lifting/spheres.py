@@ -3,6 +3,7 @@
 And the regions between folds, with the points from which they are coned.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -49,12 +50,11 @@ class Parts:
     """How closed surfaces are parted.
 
     region: of each triangle; region_surface, region_index, region_cap, first_curve: of the regions,
-    the point from which their lid was drawn and one of the curves around them (−1 if there is
+    the point from which their last lid was drawn and one of the curves around them (−1 if there is
     none); folds, curve, beside: sides between two indices, or
     where another sheet crosses, the closed curve that they belong to, and the regions on both
     sides; curve_surface, curve_met: of the curves, the surface and whether another sheet crosses;
-    whole: surfaces that are spheres, parted without contradiction. Regions have one lid at most:
-    between two, the constraint might be a tube.
+    whole: surfaces that are spheres, parted without contradiction.
     """
 
     closed: Closed
@@ -150,23 +150,18 @@ def part(closed: Closed, marks: Float[np.ndarray, " points"]) -> Parts:
     whole = curves.closed & (_characteristics(closed, base) == 2)
     whole &= np.bincount(region_surface, minlength=count) == curves.amount + 1
     whole[fold_surface[~fits | (met[folded] != curve_met[curves.label])]] = False
-    region_cap, several = _lids(closed, region, len(region_index))
-    whole[region_surface[several]] = False
+    region_cap = _caps_of(closed, region, len(region_index))
     return Parts(
         closed, region, region_surface, region_index, region_cap, first_curve,
         folds, curves.label, beside, curve_surface, curve_met, whole,
     )  # fmt: skip
 
 
-def _lids(
-    closed: Closed, region: Items, count: int
-) -> tuple[Int[np.ndarray, " regions"], Bool[np.ndarray, " regions"]]:
-    """Points from which the lids of regions were drawn, and which regions have several lids."""
-    lid = np.flatnonzero(closed.lid)
-    first, last = np.full(count, len(closed.caps)), np.full(count, -1)
-    np.minimum.at(first, region[lid], closed.rim[lid])
+def _caps_of(closed: Closed, region: Items, count: int) -> Int[np.ndarray, " regions"]:
+    """Points from which the last lids of regions were drawn, −1 where there is none."""
+    lid, last = np.flatnonzero(closed.lid), np.full(count, -1)
     np.maximum.at(last, region[lid], closed.rim[lid])
-    return np.where(last >= 0, np.append(closed.caps, -1)[last], -1), first < last
+    return np.where(last >= 0, np.append(closed.caps, -1)[last], -1)
 
 
 def _in_order(label: Items, marks: ItemValues) -> Items:
@@ -214,10 +209,10 @@ def upright_apexes(
 ) -> tuple[Int[np.ndarray, " regions"], Bool[np.ndarray, " regions"]]:
     """Apexes, or points in their stead that overturn less, and the regions overturned even so.
 
-    Of a region with a lid the point on the constraint can be taken, of one between several folds
-    the middle of another. Over the faces of its grid tetrahedron a region is coned upright from all
-    points inside, if the discs there are upright; those at cusps are not, at any scale, nor are
-    fans of several folds that meet there: regions at folds count only if they have a lid.
+    Points from which lids or folds around the region are drawn can be taken. Over the faces of its
+    grid tetrahedron a region is coned upright from all points inside, if the discs there are
+    upright; those at cusps are not, at any scale, nor are fans of several folds that meet there:
+    regions at folds count only if they have a lid.
     """
     fans, sides = fans_of(parts, middles)
     facets = np.concatenate([parts.closed.corners, fans, fans])
@@ -229,7 +224,7 @@ def upright_apexes(
     folded = parts.first_curve >= 0
     inner = np.concatenate([parts.closed.lid, np.ones(2 * len(fans), bool)]) | ~folded[region]
     best, least = apexes.copy(), np.full(count, np.inf)
-    for candidates in (apexes, *_others(parts, middles)):
+    for candidates in (apexes, *_inner_points(parts, middles)):
         corners = np.concatenate([facets, candidates[region, None]], axis=1)
         volume = volumes(place[corners]) * signs
         total = np.bincount(region, volume, count)
@@ -240,14 +235,22 @@ def upright_apexes(
     return best, (least > NOISE) & (lidded | ~folded)
 
 
-def _others(
+def _inner_points(
     parts: Parts, middles: Int[np.ndarray, " curves"]
-) -> tuple[Int[np.ndarray, " regions"], Int[np.ndarray, " regions"]]:
-    """Other points from which regions can be coned: of their lid, and of their last curve."""
-    last = np.full(len(parts.region_cap), -1)
-    for side in parts.beside.T:
-        np.maximum.at(last, side, parts.curve)
-    return parts.region_cap, np.append(middles, -1)[last]
+) -> Iterator[Int[np.ndarray, " regions"]]:
+    """Points from which lids and folds around regions are drawn: one of each region at a time."""
+    closed, lid = parts.closed, np.flatnonzero(parts.closed.lid)
+    region = np.concatenate([parts.region[lid], *parts.beside.T])
+    point = np.concatenate([closed.caps[closed.rim[lid]], np.tile(middles[parts.curve], 2)])
+    base = int(point.max(initial=0)) + 1
+    region, point = np.divmod(distinct((region * base + point)[point >= 0]), base)
+    first = np.flatnonzero(np.diff(region, prepend=-1))
+    rank = np.arange(len(region)) - np.repeat(first, np.diff(first, append=len(region)))
+    for number in range(int(rank.max(initial=-1)) + 1):
+        own = rank == number
+        out = np.full(len(parts.region_cap), -1)
+        out[region[own]] = point[own]
+        yield out
 
 
 def _coherent(facets: Triples, region: Items) -> Items:

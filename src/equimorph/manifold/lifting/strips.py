@@ -10,6 +10,7 @@ See docs/decisions.md, "Strips between a fold and a constraint are led along".
 import numpy as np
 
 from equimorph.arrays import Float, Int, Items
+from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.tangents import cap_normals, fold_forms
 from equimorph.manifold.lifting.courses import WaysOut, split_sides, ways_out
 from equimorph.manifold.lifting.pairing import Pairing
@@ -23,6 +24,7 @@ def strips_astray(pairing: Pairing, astray: Int[np.ndarray, "a 4"]) -> dict[int,
     rings close, in the middle of these.
     """
     out = dict(pairing.rings)
+    astray = astray[pairing.points.kind[astray[:, 1]] == VertexKind.FOLD]
     if len(astray) == 0:
         return out
     triangle, fold = astray[:, 0], astray[:, 1]

@@ -1,0 +1,204 @@
+"""Curves on the set followed in the planes of grid triangles: folds, and where a constraint acts.
+
+Steps along the tangent are halved until their corrections are short and both tangents alike; the
+last one ends on the side itself.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from equimorph.arrays import Float, Items, Lanes, Parameters, Values
+from equimorph.columns import Columns
+from equimorph.manifold.geometry.exact_points import Aim, Pinned, correct_points
+from equimorph.manifold.geometry.setting import Setting, embed
+from equimorph.manifold.geometry.simplices import plane_bases, shares_in
+from equimorph.manifold.geometry.tangents import (
+    cap_slopes,
+    fold_forms,
+    fold_rows,
+    fold_slopes,
+    frames_in_embedding,
+    split_step,
+    tangent_frames,
+)
+
+OFF, STRAIGHT = 0.25, 0.9
+"""Longest correction of a step, in its length, and least cosine of the tangents at its ends."""
+CORRECTIONS = 10
+"""Of a guess of a step, at most: those that are close enough, see `OFF`, need fewer. Of 4800 lanes
+of set 923 of the soak 2000 used up 60, which took half of its time."""
+CONTRACTION = 0.5
+"""Length of a corrective step, in that of the one before, from which on the constraint has a kink."""
+BEYOND = 1e-9
+"""Barycentric coordinate up to which points lie beyond sides: that of round-off."""
+Full = Float[np.ndarray, "n full"]
+
+
+@dataclass(frozen=True)
+class Walk(Columns):
+    """Points of folds, or of where a constraint acts, in triangles.
+
+    cap: whether it is a constraint; tangent: of unit length in the embedding, with changes of z and
+    of the scaled free parameters; rows: a basis, in the embedding, of a space near that of the set;
+    length: of the next step, at most; start: number of the corner opposite the side of the first
+    point, −1 later; low: index on the lower side of a fold.
+    """
+
+    cap: bool
+    corners: Float[np.ndarray, "n 3 d"]
+    z: Lanes
+    p: Parameters
+    tangent: Full
+    rows: Float[np.ndarray, "n d coordinates"]
+    length: Values
+    start: Items
+    low: Items
+
+    @classmethod
+    def start_from(
+        cls, setting: Setting, corners: Float[np.ndarray, "n 3 d"], z: Lanes, p: Parameters,
+        low: Items, *, cap: bool,
+    ) -> "Walk":  # fmt: skip
+        """First points on sides of triangles, with tangents that lead into these."""
+        n, d = setting.structure.unknowns, len(setting.free)
+        rows = np.zeros((len(z), d, n + d))
+        rows[:, :, n:] = np.eye(d)
+        tangent, rows = _tangents(setting, cap, corners, z, p, rows)
+        side = shares_in(corners, p[:, setting.free]).argmin(axis=1)
+        walk = cls(cap, corners, z, p, tangent, rows, np.full(len(z), np.inf), side, low)
+        inwards = np.take_along_axis(walk.rates(setting), side[:, None], axis=1)
+        return replace(walk, tangent=tangent * np.copysign(1.0, inwards))
+
+    def rates(self, setting: Setting) -> Float[np.ndarray, "n 3"]:
+        """Changes of the barycentric coordinates along the tangents."""
+        along = self.tangent[:, -len(setting.free) :] * setting.scales
+        there = shares_in(self.corners, self.corners[:, 0] + along)
+        return np.asarray(there - np.array([1.0, 0.0, 0.0]))
+
+    def step(self, setting: Setting) -> tuple["Walk", Items]:
+        """Points after one step, or the same ones with a shorter step; corners opposite the sides.
+
+        −1 where no side was reached.
+        """
+        way, apex = self._ways_out(setting)
+        leaves = way <= self.length
+        length = np.minimum(way, self.length)
+        dz, dp = split_step(setting, length[:, None] * self.tangent)
+        guess = replace(self, z=self.z + dz, p=self.p + dp)
+        there = Pinned(guess.z, guess.p, np.zeros(len(way), bool))
+        if len(stay := np.flatnonzero(~leaves)):
+            there = there.with_rows(stay, guess.take(stay).inside(setting, length[stay]))
+        if len(out := np.flatnonzero(leaves)):
+            there = there.with_rows(out, guess.take(out).on_side(setting, length[out], apex[out]))
+        known = there.found[:, None]
+        there = replace(
+            there, z=np.where(known, there.z, self.z), p=np.where(known, there.p, self.p)
+        )
+        tangent, rows = _tangents(setting, self.cap, self.corners, there.z, there.p, self.rows)
+        cosine = (_rows(setting, tangent) * _rows(setting, self.tangent)).sum(axis=1)
+        off = np.linalg.norm(
+            embed(setting, there.z, there.p) - embed(setting, guess.z, guess.p), axis=1
+        )
+        good = there.found & (off < OFF * length) & (np.abs(cosine) > STRAIGHT)
+        # a step that is bent out of the triangle passed the side
+        good &= leaves | (shares_in(self.corners, there.p[:, setting.free]).min(axis=1) > -BEYOND)
+        moved = replace(
+            self, z=there.z, p=there.p, tangent=tangent * np.copysign(1.0, cosine)[:, None],
+            rows=rows, length=2.0 * length, start=np.full(len(self.z), -1),
+        )  # fmt: skip
+        waiting = replace(self, length=0.5 * length)
+        return moved.where(good, waiting), np.where(good & leaves, apex, -1)
+
+    def _ways_out(self, setting: Setting) -> tuple[Values, Items]:
+        """Lengths of the straight ways out of the triangles, and corners opposite the sides."""
+        rates = self.rates(setting)
+        shares = np.maximum(shares_in(self.corners, self.p[:, setting.free]), 0.0)
+        ways = np.where(rates < 0.0, shares / np.maximum(-rates, 1e-300), np.inf)
+        started = np.flatnonzero(self.start >= 0)
+        ways[started, self.start[started]] = np.inf
+        return ways.min(axis=1), ways.argmin(axis=1)
+
+    def inside(self, setting: Setting, length: Values) -> Pinned:
+        """Points across the tangents, from guesses, in the planes of the triangles."""
+        span = plane_bases(self.corners / setting.scales)
+        rows = _rows(setting, self.tangent)[:, None]
+        middle = embed(setting, self.z, self.p)
+        return self._corrected(setting, span, middle, rows, length)
+
+    def on_side(self, setting: Setting, length: Values, apex: Items) -> Pinned:
+        """Points on sides, from guesses."""
+        every = np.arange(len(apex))
+        ends = [self.corners[every, (apex + k) % 3] for k in (1, 2)]
+        along = (ends[1] - ends[0]) / setting.scales
+        size = np.linalg.norm(along, axis=1, keepdims=True)
+        along = along / size
+        p = self.p.copy()
+        off = (p[:, setting.free] - ends[0]) / setting.scales
+        share = (off * along).sum(axis=1, keepdims=True)
+        p[:, setting.free] = ends[0] + share * along * setting.scales
+        middle = embed(setting, self.z, p)
+        guess = replace(self, p=p)
+        found = guess._corrected(setting, along[:, None], middle, middle[:, None][:, :0], length)
+        place = (found.p[:, setting.free] - ends[0]) / setting.scales
+        share = (place * along).sum(axis=1) / size[:, 0]
+        on = (share > -BEYOND) & (share < 1.0 + BEYOND)
+        return replace(found, found=found.found & on)
+
+    def _corrected(
+        self,
+        setting: Setting,
+        span: Float[np.ndarray, "n m d"],
+        middle: Float[np.ndarray, "n coordinates"],
+        rows: Float[np.ndarray, "n k coordinates"],
+        length: Values,
+    ) -> Pinned:
+        aim = Aim(setting, not self.cap, self.cap, span, middle, rows)
+        low, contraction = (None, CONTRACTION) if self.cap else (self.low, np.inf)
+        return correct_points(
+            aim, self.z, self.p, length, low, iterations=CORRECTIONS, contraction=contraction
+        )
+
+
+def _rows(
+    setting: Setting, tangent: Float[np.ndarray, "n full"]
+) -> Float[np.ndarray, "n coordinates"]:
+    """Tangents in the coordinates of the embedding."""
+    return np.asarray(frames_in_embedding(setting, tangent[:, None])[:, 0])
+
+
+def _tangents(
+    setting: Setting,
+    cap: bool,
+    corners: Float[np.ndarray, "n 3 d"],
+    z: Lanes,
+    p: Parameters,
+    rows: Float[np.ndarray, "n d coordinates"],
+) -> tuple[Full, Float[np.ndarray, "n d coordinates"]]:
+    """Unit tangents, of either sense, of curves in the planes of triangles; bases of the set's."""
+    if cap:
+        frames = tangent_frames(setting, z, p, rows)
+        held = cap_slopes(setting, z, p, frames)
+    else:
+        forms = fold_forms(setting, z, p)
+        frames = tangent_frames(setting, z, p, fold_rows(setting, forms))
+        held = fold_slopes(setting, z, p, frames, forms.null)
+    tangent = np.einsum("nk,nkf->nf", directions(setting, corners, frames, held), frames)
+    size = np.linalg.norm(_rows(setting, tangent), axis=1, keepdims=True)
+    return tangent / np.maximum(size, 1e-300), frames_in_embedding(setting, frames)
+
+
+def directions(
+    setting: Setting,
+    corners: Float[np.ndarray, "n 3 d"],
+    frames: Float[np.ndarray, "n d full"],
+    slope: Float[np.ndarray, "n d"],
+) -> Float[np.ndarray, "n d"]:
+    """Unit vectors, of either sense, in frames: across slopes and in the planes of triangles."""
+    held = slope[:, None] / np.maximum(np.linalg.norm(slope, axis=1), 1e-300)[:, None, None]
+    if len(setting.free) > corners.shape[1] - 1:  # no step leaves the plane
+        span = plane_bases(corners / setting.scales)
+        normal = np.cross(span[:, 0], span[:, 1])
+        across = np.einsum("nkd,nd->nk", frames[:, :, -len(setting.free) :], normal)[:, None]
+        held = np.concatenate([held, across], axis=1)
+    return np.asarray(np.linalg.svd(held)[2][:, -1])
