@@ -113,11 +113,13 @@ class Linked:
     """Polygons that chains of a triangle form along constraints, and what leads out of it.
 
     polygons: None if some end leads nowhere; astray: triangle and end,
-    three times, where it leads to a state that is not known.
+    three times, where it leads to a state that is not known; apart: whether no end is known to lead
+    to another chain.
     """
 
     polygons: list[Polygon] | None
     astray: list[tuple[int, int, int, int]]
+    apart: bool
 
 
 def link(pairing: Pairing, chains: Mapping[int, Sequence[Polygon]]) -> dict[int, Linked]:
@@ -151,8 +153,14 @@ def _linked(
     partner = {other: end for end, other in partner.items() if other >= 0} | partner
     mutual = all(partner.get(other) == end for end, other in partner.items())
     if not mutual or len(partner) != 2 * len(chains):
-        return Linked(None, astray)
-    return Linked(list(_cycles(chains, partner)), [])
+        own = {end: other for chain in chains for end, other in _both_ways(chain)}
+        return Linked(None, astray, not astray and partner.items() <= own.items())
+    return Linked(list(_cycles(chains, partner)), [], False)
+
+
+def _both_ways(chain: Polygon) -> tuple[tuple[int, int], tuple[int, int]]:
+    first, last = chain.points[0], chain.points[-1]
+    return (first, last), (last, first)
 
 
 def _cycles(chains: Sequence[Polygon], partner: Mapping[int, int]) -> Iterator[Polygon]:

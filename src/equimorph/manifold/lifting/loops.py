@@ -203,6 +203,12 @@ def _linked(
         if linked.polygons is not None:
             closed = [polygon for polygon in unclear[triangle] if not polygon.open]
             polygons.extend([*closed, *linked.polygons])
+        elif (
+            linked.apart
+            and len(chains[triangle]) > 1
+            and _close_themselves(pairing, chains[triangle])
+        ):
+            polygons.extend(unclear[triangle])
     return polygons, lost
 
 
@@ -265,8 +271,9 @@ def _closes_alone(pairing: Pairing, chains: list[Polygon]) -> bool:
     crossings = [_crossings(pairing, chain) for chain in chains]
     if len(chains) == 2 and crossings[0] and crossings[0] == crossings[1]:
         return True
-    rules = (_close_themselves, _on_own_sheets)[: 2 if any(crossings) else 1]
-    return any(rule(pairing, chains) for rule in rules)
+    if not any(crossings):
+        return False
+    return any(rule(pairing, chains) for rule in (_close_themselves, _on_own_sheets))
 
 
 def _on_own_sheets(pairing: Pairing, chains: list[Polygon]) -> bool:
