@@ -2,7 +2,7 @@
 
 On the set a constraint acts along a curve, which passes folds and leads from an end of one open
 chain to that of another, or of the same. Where two constraints take turns it has a kink: there it
-goes on along the other one, to the side on which the first is kept.
+goes on along the other one, to the side on which that one is the larger, or the smaller one of two.
 
 See docs/decisions.md, "Constraints are followed where several chains end on them".
 """
@@ -19,13 +19,18 @@ from equimorph.manifold.geometry.exact_points import Aim, correct_points
 from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.setting import Setting, embed
 from equimorph.manifold.geometry.simplices import shares_in
-from equimorph.manifold.geometry.tangents import cap_slopes, split_step, tangent_frames
+from equimorph.manifold.geometry.tangents import (
+    cap_slopes,
+    frames_in_embedding,
+    split_step,
+    tangent_frames,
+)
 from equimorph.manifold.lifting.courses import on_sides
 from equimorph.manifold.lifting.fold_walks import nearest_at
 from equimorph.manifold.lifting.pairing import CapExit, Pairing
 from equimorph.manifold.lifting.polygon_cuts import planes
 from equimorph.manifold.lifting.polygons import Polygon
-from equimorph.manifold.lifting.walks import Walk, directions
+from equimorph.manifold.lifting.walks import Walk, directions, tangent_rows
 
 STEPS = 120
 """Steps that are tried, at most: one without kinks takes some 10, and each kink as many again."""
@@ -92,7 +97,10 @@ def _follow(pairing: Pairing, triangle: Items, cap: Items) -> list[CapExit | Non
 
 
 def _past_kinks(setting: Setting, walk: Walk, inside: Bool[np.ndarray, " n"]) -> Walk:
-    """Turn those walks that are stuck at kinks, along the constraint that acts behind."""
+    """Turn those walks that are stuck at kinks, along the constraint that acts behind.
+
+    If that rises ahead, the larger one of both acts: the first falls on the way on, else it rises.
+    """
     lanes = np.flatnonzero(inside & (walk.length < KINK))
     if len(lanes) == 0:
         return walk
@@ -103,7 +111,11 @@ def _past_kinks(setting: Setting, walk: Walk, inside: Bool[np.ndarray, " n"]) ->
     there = cap_slopes(setting, stuck.z + dz, stuck.p + dp, frames)
     along = directions(setting, stuck.corners, frames, there)
     off = (along * here).sum(axis=1) / np.maximum(np.linalg.norm(here, axis=1), 1e-300)
-    tangent = np.einsum("nk,nkf->nf", -np.sign(off)[:, None] * along, frames)
+    rows = frames_in_embedding(setting, frames)
+    ahead = (np.einsum("nkc,nc->nk", rows, tangent_rows(setting, stuck.tangent)) * there).sum(
+        axis=1
+    )
+    tangent = np.einsum("nk,nkf->nf", -np.sign(off * ahead)[:, None] * along, frames)
     turned = replace(stuck, tangent=tangent, length=PAST * stuck.length)
     return walk.with_rows(lanes, turned.where(np.abs(off) > BENT, stuck))
 

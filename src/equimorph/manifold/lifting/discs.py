@@ -8,6 +8,7 @@ import numpy as np
 from equimorph.arrays import Bool, Int, Items, Pairs, Triples
 from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.setting import embed
+from equimorph.manifold.geometry.simplices import shares_in
 from equimorph.manifold.geometry.topology import flags_of, keys_of, rows_of
 from equimorph.manifold.lifting.constraint_sides import close_along_constraints
 from equimorph.manifold.lifting.crossing_branches import lonely
@@ -288,7 +289,13 @@ def _triangulate(pairing: Pairing, pieces: list[_PlanPiece], found: _Found) -> N
     corners = np.array([each.corners for each in pieces])
     places = embed(pairing.setting, store.z[corners.ravel()], store.p[corners.ravel()])
     sides = np.array([each.plan.on(each.corners) for each in pieces])
-    triangles, possible = triangulate(places.reshape(*corners.shape, -1), sides)
+    below = pairing.mesh.triangles[[each.plan.polygon.triangle for each in pieces]]
+    shares = shares_in(
+        np.repeat(pairing.mesh.vertices[below], corners.shape[1], axis=0),
+        store.p[corners.ravel()][:, pairing.setting.free],
+    )
+    flat = shares[:, 1:].reshape(*corners.shape, 2)
+    triangles, possible = triangulate(places.reshape(*corners.shape, -1), sides, flat)
     rows = np.arange(len(corners))[:, None, None]
     for piece, own, good in zip(
         pieces, corners[rows, triangles].tolist(), possible.tolist(), strict=True

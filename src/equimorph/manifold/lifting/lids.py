@@ -12,11 +12,12 @@ from itertools import combinations
 
 import numpy as np
 
-from equimorph.arrays import Bool, Float, Int, Items, Lanes, Pairs, Parameters
+from equimorph.arrays import Bool, Int, Items, Lanes, Pairs, Parameters, Places
 from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.setting import Setting, embed
 from equimorph.manifold.geometry.simplices import shares_in
 from equimorph.manifold.geometry.tangents import (
+    cap_normals,
     cap_slopes,
     fold_forms,
     fold_rows,
@@ -158,8 +159,8 @@ def joined_by_tubes(pairing: Pairing, parts: Parts) -> Int[np.ndarray, " k"]:
     used, number = np.unique(points, return_inverse=True)
     if len(used) == 0:
         return used
-    place = embed(setting, store.z[used], store.p[used])
-    rise = _slopes(setting, store.z[used], store.p[used], store.kind[used] == VertexKind.CORNER)
+    z, p, on_fold = store.z[used], store.p[used], store.kind[used] == VertexKind.CORNER
+    over = _over_parameters(setting, z, p, on_fold), _along_set(setting, z, p, on_fold)
     meeting = store.kind[used] == VertexKind.CROSSING
     first = np.flatnonzero(np.diff(at, prepend=-1))
     lids = np.split(number, first[1:])
@@ -168,7 +169,8 @@ def joined_by_tubes(pairing: Pairing, parts: Parts) -> Int[np.ndarray, " k"]:
         [
             parts.region_surface[region[one]]
             for one, other in _pairs(region)
-            if meeting[lids[one]].any() or not _are_apart(place, rise, lids[one], lids[other])
+            if meeting[lids[one]].any()
+            or not any(_are_apart(*each, lids[one], lids[other]) for each in over)
         ]
     ).astype(int)
 
@@ -179,15 +181,10 @@ def _pairs(region: Items) -> Iterator[tuple[int, int]]:
         yield from combinations(own.tolist(), 2)
 
 
-def _are_apart(
-    place: Float[np.ndarray, "points coordinates"],
-    rise: Float[np.ndarray, "points coordinates"],
-    one: Items,
-    other: Items,
-) -> bool:
+def _are_apart(place: Places, rise: Places, one: Items, other: Items) -> bool:
     """Whether all points of a lid are before the planes that touch the constraint at the other.
 
-    `rise`: slopes of the excess along the set.
+    rise: slopes of the excess.
     """
     way = place[one][:, None] - place[other]
     towards_one = np.einsum("abc,ac->ab", way, rise[one])
@@ -195,14 +192,28 @@ def _are_apart(
     return bool((towards_one > 0.0).all() or (towards_other > 0.0).all())
 
 
-def _slopes(
+def _over_parameters(
     setting: Setting, z: Lanes, p: Parameters, on_fold: Bool[np.ndarray, " n"]
-) -> Float[np.ndarray, "n coordinates"]:
-    """Slopes of the largest excess along the set, in the coordinates of the embedding."""
+) -> tuple[Places, Places]:
+    """Places among the free parameters, and slopes of the largest excess along these.
+
+    On folds there are none: nothing lies before their planes.
+    """
+    slopes = np.full((len(z), len(setting.free)), np.nan)
+    slopes[~on_fold] = cap_normals(setting, z[~on_fold], p[~on_fold])
+    return p[:, setting.free] / setting.scales, slopes
+
+
+def _along_set(
+    setting: Setting, z: Lanes, p: Parameters, on_fold: Bool[np.ndarray, " n"]
+) -> tuple[Places, Places]:
+    """Places in the embedding, and slopes of the largest excess along the set."""
     n, d = setting.structure.unknowns, len(setting.free)
     rows = np.zeros((len(z), d, n + d))
     rows[:, :, n:] = np.eye(d)
     rows[on_fold] = fold_rows(setting, fold_forms(setting, z[on_fold], p[on_fold]))
     frames = tangent_frames(setting, z, p, rows)
     slopes = cap_slopes(setting, z, p, frames)
-    return np.einsum("nd,ndc->nc", slopes, frames_in_embedding(setting, frames))
+    return embed(setting, z, p), np.einsum(
+        "nd,ndc->nc", slopes, frames_in_embedding(setting, frames)
+    )

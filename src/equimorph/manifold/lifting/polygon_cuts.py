@@ -26,6 +26,8 @@ REGULAR, TURN, MEETING = 0, 1, 2
 """What the points of polygons are."""
 SORTS = MEETING, TURN
 """Of points that are joined by chords."""
+OVERTURNED = 1e6
+"""What an overturned grid triangle costs, in longest squared diagonals: more than any of these."""
 
 
 def match_folds(
@@ -158,13 +160,17 @@ def cut(polygon: Sequence[int], chords: Sequence[Chord], middle: dict[Chord, int
 
 
 def triangulate(
-    places: Float[np.ndarray, "pieces corners dims"], sides: Int[np.ndarray, "pieces corners"]
+    places: Float[np.ndarray, "pieces corners dims"],
+    sides: Int[np.ndarray, "pieces corners"],
+    flat: Float[np.ndarray, "pieces corners 2"] | None = None,
 ) -> tuple[Int[np.ndarray, "pieces triangles 3"], Bool[np.ndarray, " pieces"]]:
     """Triangles of pieces with equally many corners, with the least sum of squared diagonals.
 
     Returned are the places of the triangles' corners in their piece, and which pieces can be
     triangulated. `sides` flags, one bit each, on which sides of the grid triangle a corner lies: a
-    diagonal between corners on one side could coincide with one of the neighbour's.
+    diagonal between corners on one side could coincide with one of the neighbour's. `flat`: places
+    in the plane of the grid triangle, for pieces with corners inside it, over which as little as
+    can be is overturned.
     """
     count = places.shape[1]
     gap = ((places[:, :, None] - places[:, None]) ** 2).sum(axis=3)
@@ -172,8 +178,20 @@ def triangulate(
     around = np.arange(count)
     # sides of the polygon cost nothing
     diagonal[:, around, around - 1] = diagonal[:, around - 1, around] = 0.0
-    apex, cost = _cheapest_apexes(diagonal)
+    overturned = None if flat is None else OVERTURNED * gap.max() * _overturned(flat)
+    apex, cost = _cheapest_apexes(diagonal, overturned)
     return _fan_out(apex), np.isfinite(cost)
+
+
+def _overturned(
+    flat: Float[np.ndarray, "pieces corners 2"],
+) -> Float[np.ndarray, "pieces corners corners corners"]:
+    """Areas of the triangles of any three corners that lie the other way round than their piece."""
+    x, y = np.moveaxis(flat, 2, 0)
+    twice = x[:, :, None] * y[:, None] - x[:, None] * y[:, :, None]
+    whole = np.trace(np.roll(twice, -1, axis=2), axis1=1, axis2=2)
+    area = twice[:, :, :, None] + twice[:, None] + np.swapaxes(twice, 1, 2)[:, :, None]
+    return np.asarray(np.maximum(-0.5 * area * np.sign(whole)[:, None, None, None], 0.0))
 
 
 @lru_cache(maxsize=4096)
@@ -208,10 +226,12 @@ def has_triangulation(sides: tuple[int, ...]) -> bool:
 
 def _cheapest_apexes(
     diagonal: Float[np.ndarray, "pieces corners corners"],
+    overturned: Float[np.ndarray, "pieces corners corners corners"] | None = None,
 ) -> tuple[Int[np.ndarray, "pieces corners corners"], Float[np.ndarray, " pieces"]]:
     """Corner k that completes the triangle on each chord (i, j), by dynamic programming.
 
-    ``cost(i, j) = diagonal(i, j) + min_k (cost(i, k) + cost(k, j))``, i < k < j.
+    ``cost(i, j) = diagonal(i, j) + min_k (cost(i, k) + cost(k, j) + overturned(i, k, j))``, i < k <
+    j.
     """
     pieces, count, _ = diagonal.shape
     cost, apex = np.full(diagonal.shape, np.inf), np.full(diagonal.shape, -1)
@@ -221,6 +241,8 @@ def _cheapest_apexes(
         for i in range(count - width):
             j = i + width
             ways = cost[:, i, i + 1 : j] + cost[:, i + 1 : j, j]
+            if overturned is not None:
+                ways += overturned[:, i, i + 1 : j, j]
             best = ways.argmin(axis=1)
             cost[:, i, j] = ways[own, best] + diagonal[:, i, j]
             apex[:, i, j] = i + 1 + best

@@ -27,8 +27,8 @@ class Closed:
 
     corners, index, surface, rim: of the triangles, `rim` the number of the loop that a lid closes,
     −1 for others; met: which of their sides ab, bc, ca lie where another sheet crosses; owner: grid
-    tetrahedron of each surface; caps: of the loops, the point from which the lid was drawn, −1 if
-    there is none.
+    tetrahedron of each surface; caps: of the loops, the point inside it from which the lid was
+    drawn, −1 if there is none: on faces lie discs that a point there would be coned with.
     """
 
     corners: Triples
@@ -102,7 +102,7 @@ def closed_surfaces(
         np.concatenate([np.full(np.count_nonzero(own), -1), closing]),
         np.concatenate([surfaces.met[own], _sides_on_crossings(lids, crossing)]),
         surfaces.owner[wanted],
-        caps,
+        np.where(np.isin(caps, surfaces.corners), -1, caps),
     )
 
 

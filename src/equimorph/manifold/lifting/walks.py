@@ -96,7 +96,7 @@ class Walk(Columns):
             there, z=np.where(known, there.z, self.z), p=np.where(known, there.p, self.p)
         )
         tangent, rows = _tangents(setting, self.cap, self.corners, there.z, there.p, self.rows)
-        cosine = (_rows(setting, tangent) * _rows(setting, self.tangent)).sum(axis=1)
+        cosine = (tangent_rows(setting, tangent) * tangent_rows(setting, self.tangent)).sum(axis=1)
         off = np.linalg.norm(
             embed(setting, there.z, there.p) - embed(setting, guess.z, guess.p), axis=1
         )
@@ -122,7 +122,7 @@ class Walk(Columns):
     def inside(self, setting: Setting, length: Values) -> Pinned:
         """Points across the tangents, from guesses, in the planes of the triangles."""
         span = plane_bases(self.corners / setting.scales)
-        rows = _rows(setting, self.tangent)[:, None]
+        rows = tangent_rows(setting, self.tangent)[:, None]
         middle = embed(setting, self.z, self.p)
         return self._corrected(setting, span, middle, rows, length)
 
@@ -160,7 +160,7 @@ class Walk(Columns):
         )
 
 
-def _rows(
+def tangent_rows(
     setting: Setting, tangent: Float[np.ndarray, "n full"]
 ) -> Float[np.ndarray, "n coordinates"]:
     """Tangents in the coordinates of the embedding."""
@@ -184,7 +184,7 @@ def _tangents(
         frames = tangent_frames(setting, z, p, fold_rows(setting, forms))
         held = fold_slopes(setting, z, p, frames, forms.null)
     tangent = np.einsum("nk,nkf->nf", directions(setting, corners, frames, held), frames)
-    size = np.linalg.norm(_rows(setting, tangent), axis=1, keepdims=True)
+    size = np.linalg.norm(tangent_rows(setting, tangent), axis=1, keepdims=True)
     return tangent / np.maximum(size, 1e-300), frames_in_embedding(setting, frames)
 
 
