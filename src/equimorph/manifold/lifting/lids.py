@@ -80,10 +80,9 @@ def _on_rim(pairing: Pairing, owner: int, sides: Pairs, points: Items) -> int:
     corners = np.tile(mesh.vertices[mesh.tetrahedra[owner]], (len(points), 1, 1))
     on = shares_in(corners, pairing.points.p[points][:, setting.free]) < ON_FACE
     apart = ~(on[:, None] & on).any(axis=2) | np.eye(len(points), dtype=bool)
-    for number, point in enumerate(points.tolist()):
-        beside = np.isin(points, sides[(sides == point).any(axis=1)])
-        if (apart[number] | beside).all():
-            return point
+    for point, away in zip(points.tolist(), apart, strict=True):
+        if (away | np.isin(points, sides[(sides == point).any(axis=1)])).all():
+            return int(point)
     return -1
 
 

@@ -29,7 +29,7 @@ CORRECTIONS = 10
 """Of a guess of a step, at most: those that are close enough, see `OFF`, need fewer. Of 4800 lanes
 of set 923 of the soak 2000 used up 60, which took half of its time."""
 CONTRACTION = 0.5
-"""Length of a corrective step, in that of the one before, from which on the constraint has a kink."""
+"""Length of a corrective step, in that of the one before, beyond which a constraint has a kink."""
 BEYOND = 1e-9
 """Barycentric coordinate up to which points lie beyond sides: that of round-off."""
 Full = Float[np.ndarray, "n full"]
