@@ -193,9 +193,12 @@ def _linked(
     Where sheets cross, these are not followed.
     """
     chains = {
-        triangle: [polygon for polygon in own if polygon.open]
-        for triangle, own in unclear.items()
-        if not any(_crossings(pairing, polygon) for polygon in own)
+        triangle: [polygon for polygon in own if polygon.open] for triangle, own in unclear.items()
+    }
+    chains = {
+        triangle: own
+        for triangle, own in chains.items()
+        if not any(_crossings(pairing, chain) for chain in own)
     }
     polygons, lost = list[Polygon](), list[Astray]()
     for triangle, linked in link(pairing, chains).items():
