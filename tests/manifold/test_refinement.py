@@ -14,6 +14,7 @@ from equimorph.manifold.complex.description import Complex
 from equimorph.manifold.complex.edge_points import Places, on_edges, unmet
 from equimorph.manifold.complex.excerpts import fabric_of
 from equimorph.manifold.complex.marked_complex import Fabric, FacetMark, _bisect, edges_of
+from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.simplices import volumes
 from equimorph.manifold.geometry.topology import adjacency, chains, euler_characteristic
 from equimorph.manifold.queries.cusps import with_cusps_beside
@@ -215,15 +216,17 @@ def test_arches_on_odd_grids_are_faithful_without_slivers(load, cap, intervals, 
 
 
 @pytest.mark.slow
-def test_a_fold_hidden_in_a_cell_ends_refinement_there():
-    """A curve of the constraint meets a fold that the grid does not show: no two edges go on."""
+def test_a_fold_that_no_edge_meets_is_found_along_the_constraint():
+    """A short fold from the constraint back to it in one cell, at which refinement ended."""
     arch = Rod(load="left-half")
     given = {"fixed": {"q": 2.5}, "within": [arch.max_curvature <= 40], "checks": 0}
     with unchecked():
         box = Box(Theta=(0.2, 2.5), Delta=(-2, 2))
-        eset = refine(equilibrium_set(arch, box, intervals=(51, 19), **given), 0.02)
-    assert 0 < eset.audit.unrefined < 60
-    assert not eset.audit.clean
+        coarse = equilibrium_set(arch, box, intervals=(51, 19), **given)
+        eset = refine(coarse, 0.02)
+    assert_faithful(eset)
+    assert topology(eset) == topology(coarse)
+    assert np.count_nonzero(eset.kinds == VertexKind.CORNER) == 2
     assert len(eset.points) < 4000
 
 

@@ -107,6 +107,9 @@ class Walk(Columns):
             self, z=there.z, p=there.p, tangent=tangent * np.copysign(1.0, cosine)[:, None],
             rows=rows, length=2.0 * length, start=np.full(len(self.z), -1),
         )  # fmt: skip
+        # where it leads inwards a point on a side is the first one, or another one of that side
+        outwards = np.take_along_axis(moved.rates(setting), apex[:, None], axis=1)[:, 0] < 0.0
+        good &= ~leaves | outwards
         waiting = replace(self, length=0.5 * length)
         return moved.where(good, waiting), np.where(good & leaves, apex, -1)
 
