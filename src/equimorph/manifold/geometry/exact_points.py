@@ -30,6 +30,7 @@ from equimorph.manifold.geometry.points import Points, VertexKind
 from equimorph.manifold.geometry.setting import Setting, embed, principal_directions
 from equimorph.model import worst_excess
 from equimorph.structures.metric import products_with
+from equimorph.structures.newton import Limits
 
 Span = Float[np.ndarray, "lanes k d"]
 
@@ -45,6 +46,8 @@ LAST = 1e-9
 """Length of a step after which there is none: its error is its square."""
 FOLLOWING = 1e-13
 """Length of the following step, as the last two tell, that is not worth taking."""
+STEPS = Limits(longest=LONGEST, converged=LAST, following=FOLLOWING)
+"""Those of Newton's method, unless others are given."""
 AT_ONCE = 512
 """Groups of points that are computed together, while other threads compute other ones."""
 RESIDUAL = 1e-9
@@ -162,8 +165,7 @@ def correct_points(
     around: Values,
     lower: Numbers | None = None,
     index: Numbers | None = None,
-    iterations: int = Guards.iterations,
-    contraction: float = np.inf,
+    limits: Limits = STEPS,
 ) -> Pinned:
     """Points that are sought, from guesses.
 
@@ -177,15 +179,11 @@ def correct_points(
         another fold may be met.
     index
         Index of the sheet, if it is known: far from the guess, that of another may be met.
-    iterations
-        Corrections, at most: a guess that is close needs few.
-    contraction
-        Length of a step, in that of the one before, beyond which none is taken: across a kink of a
-        constraint steps are as long as the ones before.
+    limits
+        Of steps: a guess that is close needs few, and across a kink of a constraint they are as
+        long as the ones before.
     """
-    found = _settle_guarded(
-        aim, z, p, around, lower, index, iterations=iterations, contraction=contraction
-    )
+    found = _settle_guarded(aim, z, p, around, lower, index, limits)
     good = found.found
     if aim.crossing:
         good[good] = _crosses(aim.take(np.flatnonzero(good)), found.z[good], found.p[good])
@@ -208,7 +206,8 @@ def correct_between(
     """
     span = np.tile(np.eye(len(setting.free)), (len(middle), 1, 1))
     aim = Aim(setting, False, False, span, middle, rows)
-    found = _settle_guarded(aim, z, p, around, None, None, following)
+    limits = replace(STEPS, following=following)
+    found = _settle_guarded(aim, z, p, around, None, None, limits)
     frames, good = np.zeros_like(found.frames), found.found
     frames[good] = found.frames[good]
     return Corrected(found.z, found.p, frames, found.index, good)
@@ -221,19 +220,13 @@ def _settle_guarded(
     around: Values,
     lower: Numbers | None,
     index: Numbers | None,
-    following: float = FOLLOWING,
-    iterations: int = Guards.iterations,
-    contraction: float = np.inf,
+    limits: Limits,
 ) -> Settled:
     """Newton's method with the guards of the set."""
     setting, centre = aim.setting, aim.centre(p)
     tangents = aim.rows if aim.plain else aim.tangents
     guards = Guards(
-        iterations=iterations,
-        longest=LONGEST,
-        converged=LAST,
-        following=following,
-        contraction=contraction,
+        **vars(limits),
         trust=REACH * around + 1e-3,
         middle=centre,
         lower_index=lower,

@@ -10,7 +10,7 @@ import numpy as np
 
 from equimorph.arrays import Float, Items, Lanes, Parameters, Values
 from equimorph.columns import Columns
-from equimorph.manifold.geometry.exact_points import Aim, Pinned, correct_points
+from equimorph.manifold.geometry.exact_points import STEPS, Aim, Pinned, correct_points
 from equimorph.manifold.geometry.setting import Setting, embed
 from equimorph.manifold.geometry.simplices import plane_bases, shares_in
 from equimorph.manifold.geometry.tangents import (
@@ -28,8 +28,9 @@ OFF, STRAIGHT = 0.25, 0.9
 CORRECTIONS = 10
 """Of a guess of a step, at most: those that are close enough, see `OFF`, need fewer. Of 4800 lanes
 of set 923 of the soak 2000 used up 60, which took half of its time."""
-CONTRACTION = 0.5
-"""Length of a corrective step, in that of the one before, beyond which a constraint has a kink."""
+FEW = replace(STEPS, iterations=CORRECTIONS)
+AT_KINKS = replace(FEW, contraction=0.5)
+"""Limits of corrections; across a kink of a constraint they are as long as the ones before."""
 BEYOND = 1e-9
 """Barycentric coordinate up to which points lie beyond sides: that of round-off."""
 Full = Float[np.ndarray, "n full"]
@@ -157,10 +158,8 @@ class Walk(Columns):
         length: Values,
     ) -> Pinned:
         aim = Aim(setting, not self.cap, self.cap, span, middle, rows)
-        low, contraction = (None, CONTRACTION) if self.cap else (self.low, np.inf)
-        return correct_points(
-            aim, self.z, self.p, length, low, iterations=CORRECTIONS, contraction=contraction
-        )
+        low, limits = (None, AT_KINKS) if self.cap else (self.low, FEW)
+        return correct_points(aim, self.z, self.p, length, low, limits=limits)
 
 
 def tangent_rows(
