@@ -124,9 +124,8 @@ def _past_kinks(setting: Setting, walk: Walk, inside: Bool[np.ndarray, " n"]) ->
 class Linked:
     """Polygons that chains of a triangle form along constraints, and what leads out of it.
 
-    polygons: None if some end leads nowhere; astray: triangle and end,
-    three times, where it leads to a state that is not known; apart: whether no end is known to lead
-    to another chain.
+    polygons: None if some end leads nowhere; astray: triangle and end, three times, where it leads
+    to a point that is not known; apart: whether no end is known to lead to another chain.
     """
 
     polygons: list[Polygon] | None

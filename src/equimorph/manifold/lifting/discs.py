@@ -50,7 +50,8 @@ class Discs:
     triangles whose polygons could not be closed and cut without doubt. met: which sides ab,
     bc, ca of each triangle lie on crossings; sheet: number, over its grid triangle, of the smooth
     sheet that it belongs to. astray: doubtful grid triangles with the fold and both ends of an open
-    polygon that finds no corner there.
+    polygon that finds no corner there, or, three times, an end whose constraint leads to no known
+    point.
     """
 
     corners: Triples

@@ -49,7 +49,7 @@ class Loops:
     broken: list[int]
     """Triangles whose curves do not close, or close only after going around twice."""
     astray: list[tuple[int, int, int, int]]
-    """Ambiguous triangles with a fold that leads out where no curve is known, see `Discs`."""
+    """Ambiguous triangles with a fold or constraint that leads to nothing known, see `Discs`."""
 
 
 def find_loops(pairing: Pairing, wanted: Bool[np.ndarray, " T"] | None = None) -> Loops:
