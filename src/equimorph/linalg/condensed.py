@@ -8,10 +8,10 @@ import numpy as np
 from equimorph.arrays import Determinants, Flags, Float, Int, Numbers, Values
 from equimorph.errors import InputError
 from equimorph.linalg.bordered_kernels import solve_condensed
-from equimorph.linalg.dense import BorderedSolution, solve_bordered
+from equimorph.linalg.dense import Border, BorderedSolution, solve_bordered
 from equimorph.linalg.determinants import clear_overflows
 from equimorph.linalg.lanes import over_lanes
-from equimorph.linalg.null_vectors import ROUNDS, first_guess, near_null, unit_rows, unit_sides
+from equimorph.linalg.null_vectors import Sides, near_null
 from equimorph.linalg.simd import LANES
 
 PIVOT_GUARD = 1e-8
@@ -198,20 +198,19 @@ class CondensedLayout:
         # whole blocks: the last lane fills up one with fewer
         at = np.minimum(np.arange(max(lanes, LANES)), lanes - 1)
         matrix, rest = (diagonal[at], border[at]), np.zeros((len(at), m, m))
-        corner, rhs = np.zeros((len(at), 1, 1)), unit_sides(len(at), size)
         bent, least = (np.empty((len(at), 0)), np.empty(len(at))), np.full(len(at), np.inf)
-        v = first_guess(len(at), size)
-        for _ in range(ROUNDS):
-            b = unit_rows(v)[:, None]
-            x, _, ratio, _ = self._solve(*matrix, b, b, corner, rhs, rest, *bent)
-            v = x[:, 0, :-1]
+
+        def at_once(rhs: Sides, around: Border) -> Sides:
+            x, _, ratio, _ = self._solve(*matrix, *around, rhs, rest, *bent)
             np.minimum(least, ratio, out=least)
-        found = unit_rows(v[:lanes])
+            return x
+
+        found = near_null(at_once, len(at), size)[:lanes]
         unsafe = (~(least[:lanes] >= PIVOT_GUARD)).nonzero()[0]
         if len(unsafe):
             own = diagonal[unsafe], border[unsafe]
             found[unsafe] = near_null(
-                lambda rhs, around: self.solve(*own, *around, rhs), len(unsafe), size
+                lambda rhs, around: self.solve(*own, *around, rhs).x, len(unsafe), size
             )
         return found
 

@@ -96,7 +96,7 @@ class LinearSystem:
         """Unit vectors near the null vectors of F_z, by bordered solves that stay regular there."""
         if self.near_null is not None:
             return self.near_null()
-        return near_null(self.solve, *self.residual.shape)
+        return near_null(lambda rhs, border: self.solve(rhs, border).x, *self.residual.shape)
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,7 @@
 See docs/decisions.md, "Folds and constraints are built into the cells".
 """
 
+from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
@@ -98,7 +99,7 @@ def _pin_shared(
 ) -> list[int]:
     """Numbers of new crossings near groups that are given twice."""
     keys = [tuple(group) for group in groups]
-    once = {key: keys.count(key) for key in keys}
+    once = Counter(keys)
     over = dict(zip(keys, owner.tolist(), strict=True))
     own = np.array([over[key] for key in once], int)
     found = dict(

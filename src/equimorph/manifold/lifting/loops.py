@@ -165,14 +165,14 @@ def _decide(
         else:
             groups[triangle] = [polygon for polygon in found if polygon is not None]
             decided.extend(joined)
+    chains_of = {triangle: [each for each in own if each.open] for triangle, own in groups.items()}
+    single = [triangle for triangle, chains in chains_of.items() if len(chains) == 1]
+    alone = Polygons.of([chains_of[triangle][0] for triangle in single])
+    bent = dict(zip(single, _are_bent(pairing, alone, np.arange(len(single))), strict=True))
     for triangle, every in groups.items():
-        chains = [polygon for polygon in every if polygon.open]
-        sure = len(chains) == 0 or (
-            _closes_alone(pairing, chains)
-            if len(chains) > 1
-            else not _are_bent(pairing, Polygons.of(chains), np.zeros(1, int))[0]
-        )
-        if not sure:
+        if bent.get(triangle, False) or (
+            len(chains_of[triangle]) > 1 and not _closes_alone(pairing, chains_of[triangle])
+        ):
             unclear[triangle] = every
         else:
             decided.extend(every)

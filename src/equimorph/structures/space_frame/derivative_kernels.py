@@ -8,7 +8,11 @@ import math
 from equimorph.linalg.compiled import njit
 from equimorph.linalg.kernels import FLAGS, INNER, read_lanes, write_lanes
 from equimorph.linalg.simd import LANES, load, sincos, spread, store, work_rows
-from equimorph.structures.spatial.derivative_kernels import copy_node, normalise_node
+from equimorph.structures.spatial.derivative_kernels import (
+    copy_node,
+    normalise_node,
+    slope_by_quaternion,
+)
 from equimorph.structures.spatial.jet_kernels import (
     add,
     clear,
@@ -282,32 +286,6 @@ def _lean_on_parent(
             add(slope, 4 * (part * total + parent) + c, load(other, 4 * part + c))
 
 
-@njit(**INNER)
-def _by_quaternion(
-    pairs, parts, i, node, total, size, length, quaternions, square, inverse, unit, slope, here,
-    own, other, number, rows,
-):  # fmt: skip
-    """Slope by the quaternion of a free node, that of its length included."""
-    copy_node(parts, total, node, unit, here)
-    copy_node(parts, total, node, slope, own)
-    clear(number, 0, parts)
-    dot(pairs, here, own, number, 0)
-    for part in range(parts):
-        store(number, part, spread(0.0) - load(number, part))
-    scale(pairs, 4, number, 0, here, own)
-    clear(other, 0, 4 * parts)
-    scale(pairs, 4, inverse, parts * node, own, other)
-    for part in range(parts):
-        excess = load(square, parts * node + part)
-        excess = excess - spread(1.0) if part == 0 else excess
-        store(number, part, spread(0.5 * length) * excess)
-    copy_node(parts, total, node, quaternions, here)
-    scale(pairs, 4, number, 0, here, other)
-    for part in range(parts):
-        for c in range(4):
-            store(rows, part * size + 4 * i + c, load(other, 4 * part + c))
-
-
 @njit(**FLAGS)
 def equations_lanes(
     pairs, plain, turns_of_held, nodes, owner, slopes, weights, tangents, arclengths, stiff,
@@ -371,9 +349,9 @@ def equations_lanes(
                 hinge_axes[h], tangent, turned, hinges, unit, here, other, own, number, slope, rows,
             )  # fmt: skip
         for i in range(len(free)):
-            _by_quaternion(
-                pairs, parts, i, free[i], total, size, lengths[i], quaternions, square, inverse,
-                unit, slope, here, own, other, number, rows,
+            slope_by_quaternion(
+                pairs, parts, 4 * i, free[i], total, size, 0.5 * lengths[i], quaternions, square,
+                inverse, unit, slope, here, own, other, number, rows,
             )  # fmt: skip
         for part in range(parts):
             position = (lane * parts + part) * size

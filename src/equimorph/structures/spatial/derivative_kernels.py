@@ -160,6 +160,32 @@ def stretches_of(parts, scalars, e, i, softness, tension, tension_picks, y, axia
     add(out, 0, spread(1.0))
 
 
+@njit(**INNER)
+def slope_by_quaternion(
+    pairs, parts, first, node, nodes, size, length, given, square, inverse, unit, slope, here, own,
+    other, number, rows,
+):  # fmt: skip
+    """Slope by the quaternion of a node, with that of its length, in rows from the first one on."""
+    copy_node(parts, nodes, node, unit, here)
+    copy_node(parts, nodes, node, slope, own)
+    clear(number, 0, parts)
+    dot(pairs, here, own, number, 0)
+    for part in range(parts):
+        store(number, part, spread(0.0) - load(number, part))
+    scale(pairs, 4, number, 0, here, own)
+    clear(other, 0, 4 * parts)
+    scale(pairs, 4, inverse, parts * node, own, other)
+    for part in range(parts):
+        excess = load(square, parts * node + part)
+        excess = excess - spread(1.0) if part == 0 else excess
+        store(number, part, spread(length) * excess)
+    copy_node(parts, nodes, node, given, here)
+    scale(pairs, 4, number, 0, here, other)
+    for part in range(parts):
+        for c in range(4):
+            store(rows, part * size + first + c, load(other, 4 * part + c))
+
+
 @njit(**FLAGS)
 def equations_lanes(
     pairs, plain, slopes, weights, stiffness, moments, moment_picks, torsion, torsion_picks,
@@ -255,25 +281,10 @@ def equations_lanes(
                     value = value + spread(quadratic[k, s]) * load(y, part * scalars + s)
                 add(rows, part * entries + entries - m + k, value)
         for node in range(first, stop):
-            copy_node(parts, nodes, node, unit, here)
-            copy_node(parts, nodes, node, slope, own)
-            clear(number, 0, parts)
-            dot(pairs, here, own, number, 0)
-            for part in range(parts):
-                store(number, part, spread(0.0) - load(number, part))
-            scale(pairs, 4, number, 0, here, own)
-            clear(other, 0, 4 * parts)
-            scale(pairs, 4, inverse, parts * node, own, other)
-            for part in range(parts):
-                excess = load(square, parts * node + part)
-                excess = excess - one if part == 0 else excess
-                store(number, part, spread(lengths[node]) * excess)
-            copy_node(parts, nodes, node, given, here)
-            scale(pairs, 4, number, 0, here, other)
-            for part in range(parts):
-                for c in range(4):
-                    to = part * entries + 4 * (node - first) + c
-                    store(rows, to, load(other, 4 * part + c))
+            slope_by_quaternion(
+                pairs, parts, 4 * (node - first), node, nodes, entries, lengths[node], given,
+                square, inverse, unit, slope, here, own, other, number, rows,
+            )  # fmt: skip
         for part in range(parts):
             position = (start * parts + part) * entries
             write_lanes(rows, part * entries, 1, out, position, parts * entries, entries)
