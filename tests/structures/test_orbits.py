@@ -10,6 +10,7 @@ import equimorph as em
 from equimorph.equilibria.critical import Critical, null_border
 from equimorph.errors import InputError
 from equimorph.linalg.determinants import in_units
+from equimorph.structures.equations import Equations
 from equimorph.structures.spatial.mechanics import SpatialMechanics
 from equimorph.structures.spatial.quaternions import (
     clamp_rotation,
@@ -186,6 +187,28 @@ def test_steps_with_the_condition_applied_afterwards_are_those_of_the_whole_matr
         np.testing.assert_allclose(in_units(one, other[:, 1]), other[:, 0], rtol=rtol)
     assert gap[0.0] < 1e-9
     assert gap[1e-9] < 1e-4
+
+
+def test_steps_under_a_force_are_general_ones_where_states_could_be_turned():
+    """With the condition; and without, on orbits and among states beside these."""
+    pinned, rng = em.SpatialRod(**ROUND, phase=True), np.random.default_rng(19)
+    states = em.lift(pinned.natural_state(twist_B=6.0), {"nu": -0.1}).states
+    free = em.SpatialRod(**ROUND)
+    names = [each.name for each in free.parameters]
+    p = np.array([[state[name] if name in state.parameters else 0.0 for name in names]
+                  for state in states[:6]])  # fmt: skip
+    p[::2, names.index("Theta")] = 0.3
+    off = states.z[:6] + 1e-3 * rng.standard_normal((6, pinned.size))
+    for rod, z, at in ((pinned, off, states.p[:6]), (free, off[:, :-1].copy(), p)):
+        force, growth, row = 0.1 * rng.standard_normal((3, *z.shape))
+        closing = row, *rng.standard_normal((2, 6))
+        found = rod.mechanics.advance_under((force, growth), z, at, *closing)
+        general = Equations.advance_under(rod.mechanics, (force, growth), z, at, *closing)
+        for name, value in vars(general).items():
+            gap = np.abs(getattr(found, name) - value).max()
+            assert gap <= 1e-7 * np.abs(value).max(), name
+    there = free.mechanics.on_orbits(off[:, :-1], p)
+    assert 0 < there.sum() < 6
 
 
 # --- applied by itself ---------------------------------------------------------------------------

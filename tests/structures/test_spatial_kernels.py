@@ -5,7 +5,7 @@ import pytest
 
 import equimorph as em
 from equimorph.linalg.determinants import in_units
-from equimorph.structures.equations import advance_by
+from equimorph.structures.equations import Equations, advance_by
 from oracles.spatial_twins import energy, equations, largest_curvature, nodal_fields
 
 SOFT = {
@@ -84,6 +84,17 @@ def test_fused_steps_equal_those_of_the_general_solve(case):
     fused = mechanics.advance(z, p, dp, row, corner, defect)
     system = mechanics.linear_system(z, p, dp[:, None])
     general = advance_by(system, row, corner, defect, mechanics.constraints)
+    for name, value in vars(general).items():
+        close(getattr(fused, name), value, 1e-9)
+
+
+def test_fused_steps_under_a_force_equal_those_of_the_general_solve(case):
+    """Forces on all unknowns and closures, with parts along the quaternions."""
+    mechanics, z, p, generator = case
+    force, growth, row = generator.normal(size=(3, *z.shape))
+    closing = row, *generator.normal(size=(2, LANES))
+    fused = mechanics.advance_under((force, growth), z, p, *closing)
+    general = Equations.advance_under(mechanics, (force, growth), z, p, *closing)
     for name, value in vars(general).items():
         close(getattr(fused, name), value, 1e-9)
 

@@ -14,6 +14,7 @@ from equimorph.structures.equations import (
     Advance,
     AnyBorder,
     Direction,
+    Force,
     JointEquations,
     Shift,
     Solver,
@@ -326,8 +327,24 @@ class SpatialMechanics(SpatialLagrangian, JointEquations):
 
         One fused kernel; lanes with an unsafe pivot take the general solve.
         """
-        given = z, p, dp, row, corner, defect, np.empty((len(z), 0))
+        none = np.empty((len(z), 0))
+        given = z, p, dp, row, corner, defect, none, none, none
         return self.fused_advance(advance_lanes, self.step_tables, *given)
+
+    def advance_under(
+        self, force: Force, z: Lanes, p: Parameters, row: Lanes, corner: Values, defect: Values
+    ) -> Advance:
+        """One fused kernel; lanes with an unsafe pivot take the general solve."""
+        z, p = self.check_widths((z, p))
+        given = z, p, np.zeros_like(p), row, corner, defect, np.empty((len(z), 0)), *force
+        out, ratio = self.fused_step(advance_lanes, self.step_tables, *given)
+        unsafe = (~(ratio >= PIVOT_GUARD)).nonzero()[0]
+        if len(unsafe):
+            some = (each[unsafe] for each in (z, p, row, corner, defect))
+            again = super().advance_under((force[0][unsafe], force[1][unsafe]), *some)
+            for name, column in vars(again).items():
+                getattr(out, name)[unsafe] = column
+        return out
 
     @property
     def determinant_sign(self) -> float:

@@ -30,8 +30,10 @@ RADII = 5
 """Their number."""
 COUNT, SMALL, LARGE, TOTAL, PRODUCT, EXPONENT = range(6)
 """Rows of the extremes, as of `pivot_ratio`: of the reciprocal pivots, whose product is m·2^e."""
-DEFECT, WORST, SUM = range(3)
-"""Rows of the sums over nodes."""
+DEFECT, WORST, SUM, PUSH = range(4)
+"""Rows of the sums over nodes; PUSH: what a force that grows adds to the corner."""
+SUMS = 4
+"""Their number."""
 
 
 @njit(**INNER)
@@ -124,6 +126,43 @@ def normalise(lengths, lowered, first, stop, q, row, radii, extremes, sums):
 
 
 @njit(**INNER)
+def turn_forces(first, stop, q, radii, force, growth, sums):
+    """Forces on quaternions, and their rates: three along φ, one along q; their sums over lengths.
+
+    As `normalise` turns the closing row; both forces are to be taken off F and its rate.
+    """
+    defect, push, half = load(sums, DEFECT), load(sums, PUSH), spread(0.5)
+    for i in range(first, stop):
+        node = RADII * i
+        scale = half * load(radii, node + RADIUS)
+        share = load(radii, node + RADIAL) * load(radii, node + SOFT)
+        along, more = (
+            turn_row(q, 4 * i, force, 4 * i, scale),
+            turn_row(q, 4 * i, growth, 4 * i, scale),
+        )
+        store(force, 4 * i + 3, along)
+        store(growth, 4 * i + 3, more)
+        defect, push = defect - share * along, push + share * more
+    store(sums, DEFECT, defect)
+    store(sums, PUSH, push)
+
+
+@njit(**INNER)
+def force_node(node, radii, force, growth, slopes, at, rows, to, step):
+    """Add the forces on a node to both columns of its three rows, `step` apart.
+
+    slopes: ∂L/∂φ of the node, from the row `at` on.
+    """
+    soft = load(radii, RADII * node + INVERSE) * load(radii, RADII * node + SOFT)
+    share, more = soft * load(force, 4 * node + 3), soft * load(growth, 4 * node + 3)
+    for k in range(3):
+        slope, here = load(slopes, at + k), to + k * step
+        pull, rate = load(force, 4 * node + k), load(growth, 4 * node + k)
+        store(rows, here + FORCE, load(rows, here + FORCE) + pull + slope * share)
+        store(rows, here + COLUMN, load(rows, here + COLUMN) - rate - slope * more)
+
+
+@njit(**INNER)
 def stretch_of(radii, node):
     """Stiffness of rotations where a quaternion is longer than 1."""
     radius = load(radii, RADII * node + RADIUS)
@@ -155,20 +194,25 @@ def complete_inner(order, first, places, radii, row, gradient, width, matrix, ba
 
 
 @njit(**INNER)
-def finish_nodes(first, stop, q, radii, slopes, turns, sums, out):
-    """Changes of the quaternions by step and tangent, in pairs of rows; the largest residual."""
+def finish_nodes(first, stop, q, radii, slopes, turns, force, growth, shares, sums, out):
+    """Changes of the quaternions by step and tangent, in pairs of rows; the largest residual.
+
+    force, growth: as of `turn_forces`; shares: two rows, how far both go along the curve.
+    """
     half, two = spread(0.5), spread(2.0)
     worst, total = load(sums, WORST), load(sums, SUM)
     for i in range(first, stop):
         at, node = 4 * i, RADII * i
         q0, q1, q2, q3 = load(q, at), load(q, at + 1), load(q, at + 2), load(q, at + 3)
         radius, inverse = load(radii, node + RADIUS), load(radii, node + INVERSE)
-        soft, push = load(radii, node + SOFT), load(radii, node + EXCESS) * radius
+        soft = load(radii, node + SOFT)
+        push = load(radii, node + EXCESS) * radius - load(force, 4 * i + 3)
         g0, g1, g2 = load(slopes, 3 * i), load(slopes, 3 * i + 1), load(slopes, 3 * i + 2)
         for side in range(2):
             w0, w1 = load(turns, 6 * i + side), load(turns, 6 * i + 2 + side)
             w2 = load(turns, 6 * i + 4 + side)
             grow = inverse * (g0 * w0 + g1 * w1 + g2 * w2)
+            grow = grow + load(growth, 4 * i + 3) * load(shares, side)
             grow = soft * (grow - push) if side == 0 else soft * grow
             w0, w1, w2 = half * radius * w0, half * radius * w1, half * radius * w2
             to = 8 * i + side
@@ -176,6 +220,8 @@ def finish_nodes(first, stop, q, radii, slopes, turns, sums, out):
             store(out, to + 2, grow * q1 + w0 * q0 - w1 * q3 + w2 * q2)
             store(out, to + 4, grow * q2 + w0 * q3 + w1 * q0 - w2 * q1)
             store(out, to + 6, grow * q3 - w0 * q2 + w1 * q1 + w2 * q0)
+        g0, g1 = g0 - load(force, 4 * i), g1 - load(force, 4 * i + 1)
+        g2 = g2 - load(force, 4 * i + 2)
         g0, g1, g2 = two * inverse * g0, two * inverse * g1, two * inverse * g2
         f0, f1 = push * q0 - g0 * q1 - g1 * q2 - g2 * q3, push * q1 + g0 * q0 - g1 * q3 + g2 * q2
         f2, f3 = push * q2 + g0 * q3 + g1 * q0 - g2 * q1, push * q3 - g0 * q2 + g1 * q1 + g2 * q0

@@ -10,7 +10,7 @@ import numpy as np
 
 from equimorph.arrays import Flags, Float, Lanes, Parameters, Sides, Values
 from equimorph.linalg import BorderedSolution
-from equimorph.structures.equations import Advance, AnyBorder, Shift
+from equimorph.structures.equations import Advance, AnyBorder, Equations, Force, Shift
 from equimorph.structures.spatial.mechanics import SpatialMechanics
 from equimorph.structures.spatial.phase import PinnedMechanics
 from equimorph.structures.spatial.phase_condition import breaking_scalars, with_phase_condition
@@ -90,6 +90,21 @@ class OrbitMechanics(SpatialMechanics):
         if there.all():
             return found
         rest = super().advance(*(each[~there] for each in (z, p, dp, row, corner, defect)))
+        return Advance(**_merge(there, vars(found), vars(rest)))
+
+    def advance_under(
+        self, force: Force, z: Lanes, p: Parameters, row: Lanes, corner: Values, defect: Values
+    ) -> Advance:
+        """One Newton step under a force; the general one where states could be turned."""
+        there = self.on_orbits(z, p)
+        if not there.any():
+            return super().advance_under(force, z, p, row, corner, defect)
+        given = z, p, row, corner, defect
+        found, rest = (
+            step((force[0][some], force[1][some]), *(each[some] for each in given))
+            for step, some in ((partial(Equations.advance_under, self), there),
+                               (super().advance_under, ~there))
+        )  # fmt: skip
         return Advance(**_merge(there, vars(found), vars(rest)))
 
     def solve(

@@ -26,7 +26,7 @@ from equimorph.linalg import BorderedSolution
 from equimorph.linalg.dense import no_border
 from equimorph.linalg.lanes import over_lanes
 from equimorph.structures.contract import Symmetry
-from equimorph.structures.equations import Advance, AnyBorder, Direction, Shift
+from equimorph.structures.equations import Advance, AnyBorder, Direction, Equations, Shift
 from equimorph.structures.metric import metric_length
 from equimorph.structures.spatial.lagrangian import HALF_TURN
 from equimorph.structures.spatial.mechanics import SpatialMechanics, condition_tables
@@ -204,7 +204,7 @@ class PinnedMechanics(SpatialMechanics):
         given = (
             z, np.concatenate([none, p], axis=1), np.concatenate([none, dp], axis=1),
             row - lean[:, None] * own, corner - lean * drift,
-            defect - lean * gap - row[:, -1] * z[:, -1], springs,
+            defect - lean * gap - row[:, -1] * z[:, -1], springs, none[:, :0], none[:, :0],
         )  # fmt: skip
         step, ratio = self.bare.fused_step(advance_lanes, self.bare.step_tables, *given)
         ways = (step.dz, gap + drift * step.dt), (step.tangent_z, drift * step.tangent_t)
@@ -221,6 +221,9 @@ class PinnedMechanics(SpatialMechanics):
         step.determinant[void, 0] = pairs * np.sqrt(np.abs(step.determinant[void, 0]))
         step.determinant[void, 1] /= 2.0
         return step
+
+    advance_under = Equations.advance_under
+    """The general one: the fused step of the rod knows nothing of the condition."""
 
     def velocity(self, z: Lanes) -> Lanes:
         """ξ: quaternions change by (0, 0, −q₃, q₂), forces of the supports by (0, −f_z, f_y)."""

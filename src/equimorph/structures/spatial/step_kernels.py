@@ -31,18 +31,22 @@ from equimorph.structures.spatial.node_kernels import (
     COUNT,
     DEFECT,
     LARGE,
+    PUSH,
     RADII,
     SMALL,
     SUM,
+    SUMS,
     TOTAL,
     WORST,
     add_products,
     complete_inner,
     finish_nodes,
+    force_node,
     hold_end,
     mix,
     normalise,
     read_scalars,
+    turn_forces,
     turn_held,
 )
 
@@ -104,15 +108,16 @@ def element_work(order, gradient):
 def advance_lanes(
     places, slopes, weights, stiff, moments, moment_picks, torsion, torsion_picks, forces,
     force_picks, tension, tension_picks, softness, turned, held, axes, closing_table, compliance,
-    lengths, z, p, dp, row, corner, defect, springs,
+    lengths, z, p, dp, row, corner, defect, springs, forces_now, forces_rate,
     dz, dt, tangent_z, tangent_t, residual, index, determinant, ratio,
 ):  # fmt: skip
     """Fused Newton step, tangent and inertia of a rod; see `structures.contract.Advance`.
 
     axes: number of the multiplier along x, y, z, or −1; moment rates are left out where nothing
     but forces changes with parameters. springs: none, or of each lane the number of a vertex v and
-    w, for a spring ``½ (w·φ_v)²`` that counts in F_z only. Entries of z behind the closures, and
-    those of the results, are passed over.
+    w, for a spring ``½ (w·φ_v)²`` that counts in F_z only. forces_now, forces_rate: none, or what F
+    is on the curve, and its rate. Entries of z behind the closures, and those of the results, are
+    passed over.
     """
     elements, order = slopes.shape[0], slopes.shape[1]
     degree, size, inner = order - 1, 3 * order, 3 * (order - 2)
@@ -126,7 +131,10 @@ def advance_lanes(
     velocity, pulls, closing, closing_rates = (
         work_rows(6), work_rows(3), work_rows(3), work_rows(3)
     )  # fmt: skip
-    row_pulls, given, sums, extremes = work_rows(3), work_rows(2), work_rows(3), work_rows(6)
+    row_pulls, given, sums, extremes = work_rows(3), work_rows(2), work_rows(SUMS), work_rows(6)
+    force, growth, shares = work_rows(4 * nodes + 8), work_rows(4 * nodes + 8), work_rows(2)
+    forced = forces_now.shape[1] > 0
+    force[:], growth[:], shares[:] = 0.0, 0.0, 0.0
     gradient, compliant, total = work_rows(4 * order), work_rows(9), work_rows(3 * nodes)
     tables = (
         places, slopes, weights, stiff, moments, moment_picks, torsion, torsion_picks, forces,
@@ -159,6 +167,16 @@ def advance_lanes(
         )
         sums[:] = 0.0
         normalise(lengths, lowered, first, stop, q, row_q, radii, extremes, sums)
+        if forced:
+            read_lanes(forces_now, start * entries, entries, free, force, 4 * first, 1)
+            read_lanes(forces_rate, start * entries, entries, free, growth, 4 * first, 1)
+            turn_forces(first, stop, q, radii, force, growth, sums)
+            for k in range(LANES):
+                for c in range(3):
+                    if axes[c] >= 0:
+                        closing[c, k] -= forces_now[start + k, free + axes[c]]
+                        closing_rates[c, k] -= forces_rate[start + k, free + axes[c]]
+        store(given, 0, load(given, 0) + load(sums, PUSH))
         store(given, 1, load(given, 1) - load(sums, DEFECT))
         if held[0]:
             hold_end(turned, 0, scalars, rates, q, 0, velocity)
@@ -176,6 +194,12 @@ def advance_lanes(
             if e == elements - 1 and held[1]:
                 turn_held(order, order - 1, 1, velocity, width, matrix, base, closing_rates)
             complete_inner(order, node, places, radii, row_q, gradient, width, matrix, base)
+            if forced:
+                for i in range(order - 2):
+                    force_node(
+                        node + places[i], radii, force, growth, gradient, 4 * i, matrix,
+                        base + 3 * i * width + size, width,
+                    )  # fmt: skip
             reduce_rows(inner, size, width, matrix, base, lower, pivots, e * inner)
             for k in range(inner):
                 note_pivot(load(pivots, e * inner + k), extremes)
@@ -184,6 +208,11 @@ def advance_lanes(
             to_vertices(e, inner, size, width, matrix, base, BORDER, vertices, ties)
         for v in range(begin, last + 1):
             complete_vertex(v, v * degree, radii, row_q, total, vertices)
+            if forced:
+                force_node(
+                    v * degree, radii, force, growth, total, 3 * v * degree, vertices,
+                    3 * v * SHARES + 3, SHARES,
+                )  # fmt: skip
         if springs.shape[1] > 0:
             spring_vertices(springs, start, SHARES, vertices)
         for v in range(begin, last + 1):
@@ -200,7 +229,10 @@ def advance_lanes(
                 inner, size, e * degree, places, width, matrix, e * size * width, pivots,
                 e * inner, small, turns,
             )  # fmt: skip
-        finish_nodes(first, stop, q, radii, total, turns, sums, out)
+        if forced:
+            store(shares, 0, load(small, 3 * SYSTEM + 4))
+            store(shares, 1, load(small, 3 * SYSTEM + 5))
+        finish_nodes(first, stop, q, radii, total, turns, force, growth, shares, sums, out)
         for c in range(3):
             if axes[c] >= 0:
                 at = 2 * (4 * stop + axes[c])
