@@ -8,6 +8,8 @@ import pytest
 
 from equimorph.array_types import Float
 from equimorph.manifold import equilibrium_set
+from equimorph.manifold.lifting import cells
+from equimorph.manifold.lifting.cells import areas_over
 from equimorph.model import Box, Parameter
 from equimorph.structures import EnergyStructure, Rod, Unknown
 from equimorph.study.prepare import prepare
@@ -56,6 +58,18 @@ def test_points_that_close_cells_along_a_constraint_are_of_their_sheet(load, int
     assert eset.audit.bisected > 0
     assert eset.audit.clean, eset.audit
     assert_faithful(eset)
+
+
+def test_discs_that_a_bisection_leaves_are_found_only_once(monkeypatch):
+    """Doubtful triangles are divided several times; to find everything anew gives the same set."""
+    question = {"intervals": (31, 33), "load": "left-half", "cap": 40.0}
+    at_once = arch_set(**question)
+    assert at_once.audit.bisected > 0
+    monkeypatch.setattr(cells, "areas_over", lambda pairing, _: areas_over(pairing, None))
+    anew = arch_set(**question)
+    assert at_once.audit == anew.audit
+    one, other = (eset.coordinates[np.lexsort(eset.coordinates.T)] for eset in (at_once, anew))
+    np.testing.assert_allclose(one, other, rtol=0, atol=1e-12)
 
 
 @pytest.mark.slow

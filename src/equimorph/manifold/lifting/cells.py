@@ -6,14 +6,14 @@ from itertools import pairwise
 
 import numpy as np
 
-from equimorph.arrays import Bool, CellNumbers, Facets, Float, Int, Items
+from equimorph.arrays import Bool, CellNumbers, Facets, Float, Int, Items, Pairs
 from equimorph.manifold.complex.description import Complex, Frame, Lifting, describe
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.manifold.geometry.points import VertexKind
-from equimorph.manifold.geometry.topology import PAIR
+from equimorph.manifold.geometry.topology import PAIR, flags_of
 from equimorph.manifold.lifting.balls import Balls, fill
 from equimorph.manifold.lifting.crossing_branches import lonely
-from equimorph.manifold.lifting.discs import Discs, assemble
+from equimorph.manifold.lifting.discs import Discs, assemble, sides_among, sides_of
 from equimorph.manifold.lifting.edges import EFFORTS
 from equimorph.manifold.lifting.loops import find_loops
 from equimorph.manifold.lifting.pairing import Pairing, abandoned_rays
@@ -43,24 +43,27 @@ class Seen:
 
 
 @dataclass(frozen=True)
-class Volumes:
-    """Discs and balls, with what they depend on.
-
-    doubtful: triangles of `discs`, and tetrahedra of `balls`, that need division. What discs say of
-    folds and constraints is not kept: balls say it of their facets.
-    """
+class Areas:
+    """Discs, with what they depend on."""
 
     seen: Seen
+    discs: Discs
+
+
+@dataclass(frozen=True)
+class Volumes:
+    """Discs and balls, with what they depend on."""
+
+    areas: Areas
     tetrahedra: Int[np.ndarray, "N 4"]
     faces: Int[np.ndarray, "N 4"]
-    discs: Discs
     balls: Balls
 
 
 def volumes_over(pairing: Pairing, known: Volumes | None) -> Volumes:
     """Balls over all grid tetrahedra; those that are known stay where nothing changed."""
-    mesh, seen = pairing.mesh, Seen.of(pairing)
-    discs, same = _discs_over(pairing, seen, known)
+    mesh = pairing.mesh
+    areas, same = areas_over(pairing, None if known is None else known.areas)
     kept = np.zeros(len(mesh.tetrahedra), bool)
     if known is not None:
         count = len(known.tetrahedra)
@@ -68,22 +71,26 @@ def volumes_over(pairing: Pairing, known: Volumes | None) -> Volumes:
         kept[:count] &= (mesh.faces[:count] == known.faces).all(axis=1)
         kept &= same[mesh.faces].all(axis=1)
         kept[known.balls.doubtful] = False
-    balls = fill(pairing, discs, ~kept)
+    balls = fill(pairing, areas.discs, ~kept)
     balls = balls if known is None else _with_balls(balls, known.balls, kept)
-    return Volumes(seen, mesh.tetrahedra, mesh.faces, discs, balls)
+    return Volumes(areas, mesh.tetrahedra, mesh.faces, balls)
 
 
-def _discs_over(
-    pairing: Pairing, seen: Seen, known: Volumes | None
-) -> tuple[Discs, Bool[np.ndarray, " T"]]:
-    """Discs over all grid triangles, and which of these are certain, and the same as before."""
+def areas_over(pairing: Pairing, known: Areas | None) -> tuple[Areas, Bool[np.ndarray, " T"]]:
+    """Discs over all grid triangles, and which of these are certain, and the same as before.
+
+    Those that are known stay where nothing changed.
+    """
+    seen = Seen.of(pairing)
     same = seen.same(None if known is None else known.seen)
     if known is not None:
         same[known.discs.doubtful] = False
+        tips = np.array(list(pairing.tips), int).reshape(-1, 2)
+        same[known.discs.owner[sides_among(known.discs.corners, tips).any(axis=1)]] = False
     discs = assemble(pairing, find_loops(pairing, ~same))
     discs = discs if known is None else _with_discs(discs, known.discs, same)
     same[discs.doubtful] = False
-    return discs, same
+    return Areas(seen, discs), same
 
 
 def _around(pairing: Pairing) -> Float[np.ndarray, "T 6"]:
@@ -107,13 +114,19 @@ def _around(pairing: Pairing) -> Float[np.ndarray, "T 6"]:
 def _with_discs(new: Discs, known: Discs, same: Bool[np.ndarray, " T"]) -> Discs:
     """New discs, and known ones over triangles that are the same."""
     kept = same[known.owner]
+    sides = sides_of(known.corners[kept])
+
+    def join(name: str) -> Int[np.ndarray, "..."]:
+        return np.concatenate([getattr(new, name), getattr(known, name)[kept]])
+
+    def marked(name: str) -> Pairs:
+        pairs = getattr(known, name)
+        return np.concatenate([getattr(new, name), pairs[flags_of(pairs, sides)]])
+
     return replace(
         new,
-        corners=np.concatenate([new.corners, known.corners[kept]]),
-        index=np.concatenate([new.index, known.index[kept]]),
-        owner=np.concatenate([new.owner, known.owner[kept]]),
-        met=np.concatenate([new.met, known.met[kept]]),
-        sheet=np.concatenate([new.sheet, known.sheet[kept]]),
+        **{name: join(name) for name in ("corners", "index", "owner", "met", "sheet")},
+        **{name: marked(name) for name in ("folds", "caps", "crossings")},
     )
 
 
@@ -237,7 +250,8 @@ class CellFinder:
     """Finds the cells of the set over a mesh that is being bisected."""
 
     def __init__(self) -> None:
-        self._known: Volumes | None = None
+        self._areas: Areas | None = None
+        self._volumes: Volumes | None = None
 
     def find(self, pairing: Pairing, close: Close | None = None) -> Cells:
         """Cells of the set over a mesh whose edges are all lifted.
@@ -247,15 +261,20 @@ class CellFinder:
         if pairing.mesh.dimension == 1:
             return _segments(pairing)
         if pairing.mesh.dimension == 2:
-            discs = close(pairing)[0] if close else assemble(pairing, find_loops(pairing))
+            if close and self._areas is None:
+                self._areas = Areas(Seen.of(pairing), close(pairing)[0])
+            else:
+                self._areas, _ = areas_over(pairing, self._areas)
+            discs = self._areas.discs
             marked = (discs.folds, discs.caps, discs.crossings)
             return Cells(discs.corners, discs.index, *marked, discs.doubtful, astray=discs.astray)
-        if close and self._known is None:
-            mesh, found = pairing.mesh, close(pairing)
-            self._known = Volumes(Seen.of(pairing), mesh.tetrahedra, mesh.faces, *found)
+        if close and self._volumes is None:
+            mesh, (discs, balls) = pairing.mesh, close(pairing)
+            areas = Areas(Seen.of(pairing), discs)
+            self._volumes = Volumes(areas, mesh.tetrahedra, mesh.faces, balls)
         else:
-            self._known = volumes_over(pairing, self._known)
-        discs, balls = self._known.discs, self._known.balls
+            self._volumes = volumes_over(pairing, self._volumes)
+        discs, balls = self._volumes.areas.discs, self._volumes.balls
         marked = (balls.folds, balls.caps, balls.crossings)
         return Cells(
             balls.corners, balls.index, *marked, discs.doubtful, balls.doubtful,

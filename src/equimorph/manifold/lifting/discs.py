@@ -104,7 +104,7 @@ def assemble(pairing: Pairing, loops: Loops) -> Discs:
         corners,
         np.concatenate([index, whole.index, np.array(found.index, int)]),
         np.concatenate([loops.plain_triangle, whole.owner, np.array(found.owner, int)]),
-        _on(corners, crossings),
+        sides_among(corners, crossings),
         np.concatenate([np.zeros(plain, int), np.array(found.sheet, int)]),
         _distinct(whole.folds, found.folds, base),
         _distinct(whole.caps, found.caps, base),
@@ -121,12 +121,16 @@ def _distinct(pairs: Pairs, chords: set[Chord], base: int) -> Int[np.ndarray, "m
     return rows_of(np.unique(keys), base, 2)
 
 
-def _on(corners: Triples, chosen: Int[np.ndarray, "k 2"]) -> Bool[np.ndarray, "n 3"]:
+def sides_of(corners: Triples) -> Pairs:
+    """Sides ab, bc, ca of triangles, one triangle after the other."""
+    return corners[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+
+
+def sides_among(corners: Triples, chosen: Int[np.ndarray, "k 2"]) -> Bool[np.ndarray, "n 3"]:
     """Which sides ab, bc, ca of triangles are among the chosen ones."""
     if len(chosen) == 0:
         return np.zeros(corners.shape, bool)
-    sides = (corners[:, [k, (k + 1) % 3]] for k in range(3))
-    return np.stack([flags_of(side, chosen) for side in sides], axis=1)
+    return flags_of(sides_of(corners), chosen).reshape(corners.shape)
 
 
 def _alone(pairing: Pairing) -> list[int]:

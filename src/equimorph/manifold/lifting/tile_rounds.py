@@ -140,7 +140,7 @@ def _close_tile(tile: Pairing) -> Closed:
         discs, balls = assemble(tile, find_loops(tile)), Balls.none()
     else:
         volumes = volumes_over(tile, None)
-        discs, balls = volumes.discs, volumes.balls
+        discs, balls = volumes.areas.discs, volumes.balls
     hubs = [(*pair, point) for pair, point in tile.hubs.items() if point >= known]
     return Closed(new_points(tile, known), np.array(hubs, int).reshape(-1, 3), discs, balls)
 
