@@ -44,6 +44,19 @@ def test_the_highest_of_several_peaks_in_an_element_of_a_frame_is_taken(degree, 
     np.testing.assert_allclose(found, sampled, rtol=1e-3)
 
 
+def test_largest_norms_do_not_depend_on_other_lanes_nor_hide_what_is_no_number():
+    mesh = toggle(2, 6).model.mesh
+    values = np.random.default_rng(3).normal(size=(20, 4, 7, 2))
+    values[3, 1, 2, 0], values[5] = np.nan, 0.0
+    found = largest_norms(mesh, values)
+    assert np.isnan(found[3, 1])
+    assert np.isfinite(np.delete(found.ravel(), 3 * 4 + 1)).all()
+    np.testing.assert_array_equal(found[5], 0.0)
+    for k in range(len(values)):
+        np.testing.assert_array_equal(largest_norms(mesh, values[[k]])[0], found[k])
+    assert largest_norms(mesh, values[:0]).shape == (0, 4)
+
+
 def test_the_highest_of_several_peaks_along_a_rod_in_space_is_taken():
     """Random rough states against sampling; 1e-3: of 1001 places in each element."""
     rod = em.SpatialRod(torsion=0.77, lateral=1.0, elements=2, degree=8)

@@ -6,8 +6,10 @@ import numpy as np
 from numpy.polynomial import legendre
 
 from equimorph.arrays import Float, Int, Lanes, Parameters
+from equimorph.linalg.lanes import over_lanes
 from equimorph.structures.rod.discretisation import Mesh, reference_element
 from equimorph.structures.rod.mechanics import PlanarMechanics
+from equimorph.structures.rod.norm_kernels import largest_norms_lanes
 
 Columns = tuple[Float[np.ndarray, "lanes m"], Float[np.ndarray, "lanes m"]]
 
@@ -19,10 +21,6 @@ NEWTON = 5
 """Newton iterations towards the maximum of a polynomial."""
 FINE = 4
 """Places in each element, per degree, among which an extremum of the curvature is sought."""
-LOWEST = 0.84
-"""Least share of the largest norm of all places that one next to the extremum has: √cos(π/4)."""
-POLISHING = 5
-"""Newton iterations from the highest places towards the extremum."""
 
 
 def stations(breaks: Float[np.ndarray, " ends"]) -> Float[np.ndarray, " samples"]:
@@ -183,31 +181,13 @@ def largest_norms(
 
     The square of the norm is a polynomial in cos ϑ. A maximum M of one of degree m is at least
     M cos(m ϑ) within an angle of ϑ < π/m (M. Riesz), so that a peak of the grid lies near it
-    and is not lower than `LOWEST` of the highest; each of those is polished. Polishing the best
-    place of the grid alone gives values that jump, and bounds that are located at the jump.
+    and is not lower than `norm_kernels.LOWEST` of the highest; each of those is polished.
+    Polishing the best place of the grid alone gives values that jump, and bounds that are located
+    at the jump.
     """
-    series = np.einsum("ij,lejk->leik", mesh.reference.to_legendre, values)
-    grid, basis, slope = _fine_grid(mesh.degree)
-    sizes = np.linalg.norm(np.einsum("gi,leik->legk", basis, series), axis=3)
-    largest = sizes.max(axis=2)
-    tops = sizes >= LOWEST * largest[:, :, None]
-    tops[:, :, 1:] &= sizes[:, :, 1:] >= sizes[:, :, :-1]
-    tops[:, :, :-1] &= sizes[:, :, :-1] > sizes[:, :, 1:]
-    lane, element, at = np.nonzero(tops)
-    own = series[lane, element]
-    first = np.einsum("ij,njk->nik", slope, own)
-    second = np.einsum("ij,njk->nik", slope, first)
-    place = grid[at]
-    low = grid[np.maximum(at - 1, 0)]
-    top = grid[np.minimum(at + 1, len(grid) - 1)]
-    for _ in range(POLISHING):
-        basis = legendre.legvander(place, mesh.degree)
-        value, rate, bend = (np.einsum("ni,nik->nk", basis, each) for each in (own, first, second))
-        down = (value * rate).sum(axis=1)
-        curved = (value * bend + rate**2).sum(axis=1)
-        move = np.where(curved < 0.0, down / np.where(curved == 0.0, 1.0, curved), 0.0)
-        place = np.clip(place - move, low, top)
-    basis = legendre.legvander(place, mesh.degree)
-    polished = np.linalg.norm(np.einsum("ni,nik->nk", basis, own), axis=1)
-    np.maximum.at(largest, (lane, element), polished)
-    return np.asarray(largest)
+    largest = np.empty(values.shape[:2])
+    tables = (mesh.reference.to_legendre, *_fine_grid(mesh.degree))
+    given = [np.ascontiguousarray(each) for each in (*tables, values)]
+    if largest.size:
+        over_lanes(largest_norms_lanes, tuple(given[:-1]), given[-1:], [largest])
+    return largest
