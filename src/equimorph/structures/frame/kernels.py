@@ -134,6 +134,98 @@ def linearise_lanes(
 
 
 @njit(**INNER)
+def _read_state(z, p, lane, constant, turned, place, rows, y, psi):
+    """Scalars, the last of which is given, and turns of all nodes, of a vector of lanes."""
+    size, given, scalars = z.shape[1], p.shape[1], len(y)
+    multipliers = scalars - 1 - given
+    read_lanes(z, lane * size, size, size, rows, 0, 1)
+    read_lanes(p, lane * given, given, given, y, multipliers, 1)
+    for c in range(multipliers):
+        store(y, c, load(rows, size - multipliers + c))
+    store(y, scalars - 1, spread(constant))
+    for i in range(len(place)):
+        if place[i] >= 0:
+            store(psi, i, load(rows, place[i]))
+        else:
+            store(psi, i, _combined(turned, i, y))
+
+
+@njit(**INNER)
+def _bent_twice(
+    m, elements, nodes, softness, sine, cosine, which, ties, turns, scalars, strains, force
+):
+    """Add what one member contributes to D²F[v, w].
+
+    turns, scalars, strains: of the state, of v and of w.
+    """
+    order, count = nodes.shape[1], len(turns[0])
+    e, ev, ew = strains
+    for at in range(m * elements * order, (m + 1) * elements * order):
+        node = nodes[at // order, at % order]
+        s, c = sincos(load(turns[0], node))
+        dv, dw = load(turns[1], node), load(turns[2], node)
+        none = spread(0.0)
+        a, b, av, bv, aw, bw = none, none, none, none, none, none
+        for r in range(ties[m, 1]):
+            across, along = spread(sine[at, r]), spread(cosine[at, r])
+            own = which[m, r]
+            y, yv, yw = load(scalars[0], own), load(scalars[1], own), load(scalars[2], own)
+            a, b = a + across * y, b + along * y
+            av, bv = av + across * yv, bv + along * yv
+            aw, bw = aw + across * yw, bw + along * yw
+        k = spread(softness[at])
+        pull, shear = a * s + b * c, a * c - b * s
+        pull_v, shear_v = av * s + bv * c, av * c - bv * s
+        pull_w, shear_w = aw * s + bw * c, aw * c - bw * s
+        # first changes of P and P', and second ones
+        first_v, first_w = ev + k * (pull_v + shear * dv), ew + k * (pull_w + shear * dw)
+        both = dv * dw
+        twice = k * (shear_v * dw + shear_w * dv - pull * both)
+        bent = spread(0.0) - pull_v * dw - pull_w * dv - shear * both
+        stretch = e + k * pull
+        moment = stretch * bent + twice * shear
+        moment = moment + first_v * (shear_w - pull * dw) + first_w * (shear_v - pull * dv)
+        _add(force, node, spread(0.0) - moment)
+        # a multiplier's P = along cos ψ + across sin ψ, its first and second changes
+        twice, once = twice - stretch * both, first_v * dw + first_w * dv
+        by_sine, by_cosine = twice * s + once * c, twice * c - once * s
+        for r in range(ties[m, 0]):
+            part = spread(sine[at, r]) * by_sine + spread(cosine[at, r]) * by_cosine
+            _add(force, count + which[m, r], spread(0.0) - part)
+
+
+@njit(**FLAGS)
+def second_lanes(
+    nodes, place, softness, sine, cosine, which, ties, stretch, turned, z, p, vz, vp, wz, wp, out
+):
+    """D²F[v, w] without pressures; see `Tables`."""
+    lanes, size = z.shape
+    members, elements = len(which), len(nodes) // len(which)
+    count, scalars = len(place), turned.shape[1]
+    multipliers = scalars - 1 - p.shape[1]
+    y, yv, yw = work_rows(scalars), work_rows(scalars), work_rows(scalars)
+    psi, dv, dw = work_rows(count), work_rows(count), work_rows(count)
+    rows, force = work_rows(size), work_rows(count + multipliers)
+    for block in range(0, lanes, LANES):
+        lane = min(block, lanes - LANES)
+        _read_state(z, p, lane, 1.0, turned, place, rows, y, psi)
+        _read_state(vz, vp, lane, 0.0, turned, place, rows, yv, dv)
+        _read_state(wz, wp, lane, 0.0, turned, place, rows, yw, dw)
+        force[:] = 0.0
+        for m in range(members):
+            strains = (
+                spread(1.0) + _combined(stretch, m, y),
+                _combined(stretch, m, yv),
+                _combined(stretch, m, yw),
+            )
+            _bent_twice(
+                m, elements, nodes, softness, sine, cosine, which, ties, (psi, dv, dw), (y, yv, yw),
+                strains, force,
+            )  # fmt: skip
+        _write(place, force, rows, out, lane)
+
+
+@njit(**INNER)
 def _write(place, values, rows, target, lane):
     """Write values at the unknown nodes and of the multipliers behind the nodes."""
     count, size = len(place), target.shape[1]

@@ -20,10 +20,11 @@ from equimorph.arrays import (
 )
 from equimorph.linalg.dense import multiply
 from equimorph.linalg.intervals import Interval
+from equimorph.linalg.lanes import over_lanes
 from equimorph.linalg.sparse import SparseLayout
 from equimorph.structures.discrete import DiscreteStructure, linearise
 from equimorph.structures.equations import Direction, Enclosed
-from equimorph.structures.frame.kernels import linearise_lanes
+from equimorph.structures.frame.kernels import linearise_lanes, second_lanes
 from equimorph.structures.frame.model import FrameModel
 from equimorph.structures.frame.pressure import FramePressure
 from equimorph.structures.rod.planar_energy import PlanarEnergy
@@ -156,6 +157,16 @@ class Tables:
             self.diagonal, self.edges, self.corners, model.stretch, model.turned, slope,
             model.slope[slope[:, 0], slope[:, 1]], model.quadratic[: model.multipliers],
             self.constant,
+        )  # fmt: skip
+        return tuple(np.ascontiguousarray(array) for array in arrays)
+
+    @cached_property
+    def of_second(self) -> tuple[np.ndarray, ...]:
+        """What the kernel of second derivatives shares among lanes."""
+        model = self.model
+        arrays = (
+            model.nodes, model.place, model.softness, self._compact(model.sine),
+            self._compact(model.cosine), self.which, self.ties, model.stretch, model.turned,
         )  # fmt: skip
         return tuple(np.ascontiguousarray(array) for array in arrays)
 
@@ -317,30 +328,18 @@ class FrameMechanics(DiscreteStructure):
 
     def second_derivative(self, z: Lanes, p: Parameters, v: Direction, w: Direction) -> Lanes:
         """D²F[v, w]."""
-        model, at = self.model, self.model.nodes.ravel()
-        (y, turns, e), *both = self._fields(z, p), *(self._fields(*each, 0.0) for each in (v, w))
-        turned, gamma = self._turned(turns), model.softness
-        (yv, tv, ev), (yw, tw, ew) = both
-        dv, dw = tv[:, at], tw[:, at]
-        here, by_v, by_w = (self._pulls(each, turned, e) for each in (y, yv, yw))
-        # first changes of P and P', and second ones
-        pv, pw = by_v.tension + here.shear * dv, by_w.tension + here.shear * dw
-        sv, sw = by_v.shear - here.tension * dv, by_w.shear - here.tension * dw
-        p_vw = by_v.shear * dw + by_w.shear * dv - here.tension * dv * dw
-        s_vw = -by_v.tension * dw - by_w.tension * dv - here.shear * dv * dw
-        stretch, first_v, first_w = 1.0 + e + gamma * here.tension, ev + gamma * pv, ew + gamma * pw
-        moments = stretch * s_vw + first_v * sw + first_w * sv + gamma * p_vw * here.shear
-        out, bent = np.empty_like(z), -multiply(moments, self._gather)
+        given = [np.ascontiguousarray(each) for each in (z, p, *v, *w)]
+        out = np.empty(given[0].shape)
+        if len(out):
+            over_lanes(second_lanes, self.tables.of_second, given, [out])
         if self.pressure is not None:
-            bent += self.pressure.second(y, turns, yv, tv, yw, tw)
-        out[:, : self.unknowns] = bent[:, model.place >= 0]
-        # a multiplier's P = along cos ψ + across sin ψ, its first and second changes
-        twice = gamma * p_vw - stretch * dv * dw
-        once = first_v * dw + first_w * dv
-        (sine, cosine), m = turned, self.constraints
-        total = multiply(twice * sine + once * cosine, model.sine[:, :m])
-        total += multiply(twice * cosine - once * sine, model.cosine[:, :m])
-        out[:, self.unknowns :] = -total
+            (y, turns, _), *both = (
+                self._fields(*each, constant)
+                for each, constant in (((z, p), 1.0), (v, 0.0), (w, 0.0))
+            )
+            changes = [each for yv, tv, _ in both for each in (yv, tv)]
+            bent = self.pressure.second(y, turns, *changes)
+            out[:, : self.unknowns] += bent[:, self.model.place >= 0]
         return out
 
     # --- guesses --------------------------------------------------------------------------------

@@ -1,0 +1,77 @@
+"""Kernels of frames against plain numpy, at random states."""
+
+import numpy as np
+import pytest
+
+import equimorph as em
+from oracles.specimens import specimens
+
+FRAMES = {each.name: each.structure for each in specimens() if isinstance(each.structure, em.Frame)}
+LANES = 13
+
+
+@pytest.fixture(params=FRAMES, scope="module")
+def case(request):
+    """A frame, and a state and two directions, all random."""
+    frame, generator = FRAMES[request.param], np.random.default_rng(5)
+    widths = frame.size, len(frame.parameters)
+    rows = [[generator.normal(size=(LANES, width)) for width in widths] for _ in range(3)]
+    return frame, *map(tuple, rows)
+
+
+def tensions(frame, turns, scalars, by_turns=0):
+    """P = A sin ψ + B cos ψ at the points, for scalars, or a derivative of it by ψ."""
+    psi = turns[:, frame.model.nodes.ravel()] + by_turns * 0.5 * np.pi
+    along = (scalars @ table.T for table in (frame.model.sine, frame.model.cosine))
+    return sum(part * f(psi) for part, f in zip(along, (np.sin, np.cos), strict=True))
+
+
+def test_second_derivatives_of_frames_are_those_of_their_lagrangian(case):
+    """By the chain rule for P(ψ, y), of which Σ (1 + e) P + ½ γ P² is the only part not quadratic.
+
+    Its gradient along r is Σ ((1 + e + γ P) P_r + e_r P), which is differentiated along v and w.
+    """
+    frame, (z, p), v, w = case
+    model, n = frame.model, frame.unknowns
+    y, *both = frame.scalars(z, p), *(frame.scalars(*each, 0.0) for each in (v, w))
+    psi = frame.turns(z, y)
+    moved = [frame.turns(each[0], own) for each, own in zip((v, w), both, strict=True)]
+
+    def P(*along):  # noqa: N802  # as in the model
+        """Derivative of P along some of the directions, given by turns and scalars."""
+        turned = np.prod([turns[:, model.nodes.ravel()] for turns, _ in along] or [1.0], axis=0)
+        total = turned * tensions(frame, psi, y, len(along))
+        for k, (_, scalars) in enumerate(along):
+            rest = [turns[:, model.nodes.ravel()] for i, (turns, _) in enumerate(along) if i != k]
+            part = np.prod(rest or [1.0], axis=0)
+            total = total + part * tensions(frame, psi, scalars, len(along) - 1)
+        return total
+
+    def e(scalars):
+        return (scalars @ model.stretch.T)[:, model.owner]
+
+    a, b = zip(moved, both, strict=True)
+    gamma, found = model.softness, frame.second_derivative(z, p, v, w)
+    for column in range(frame.size):
+        turns, scalars = np.zeros_like(psi), np.zeros_like(y)
+        if column < n:
+            turns[:, np.flatnonzero(model.place == column)] = 1.0
+        else:
+            scalars[:, column - n] = 1.0
+        r = turns, scalars
+        value = (1.0 + e(y) + gamma * P()) * P(r, a, b) + e(r[1]) * P(a, b)
+        for one, two in ((a, b), (b, a)):
+            value = value + (e(one[1]) + gamma * P(one)) * P(r, two)
+        value = value + gamma * P(a, b) * P(r)
+        wanted = -value.sum(axis=1)
+        scale = 1.0 + np.abs(found).max()
+        np.testing.assert_allclose(found[:, column], wanted, rtol=0, atol=1e-12 * scale)
+
+
+def test_second_derivatives_do_not_depend_on_other_lanes(case):
+    frame, (z, p), (dz, dp), (ez, ep) = case
+    found = frame.second_derivative(z, p, (dz, dp), (ez, ep))
+    for k in range(LANES):
+        own = [each[[k]] for each in (z, p, dz, dp, ez, ep)]
+        alone = frame.second_derivative(*own[:2], tuple(own[2:4]), tuple(own[4:]))
+        np.testing.assert_array_equal(alone[0], found[k])
