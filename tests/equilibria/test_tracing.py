@@ -12,7 +12,7 @@ from equimorph.equilibria.locate import locate_branch_point
 from equimorph.equilibria.point_conditions import Plane
 from equimorph.equilibria.settle import settle
 from equimorph.equilibria.steps import Bracket, Front, step_along, unit_tangents
-from equimorph.equilibria.trace import Batching
+from equimorph.equilibria.trace import Batching, Onwards
 from equimorph.equilibria.trace_options import EventCode
 from equimorph.structures import States
 from oracles.polynomial import Polynomial, fold_form, pitchfork_form
@@ -185,6 +185,41 @@ def test_results_are_the_same_bit_for_bit_in_any_order_on_any_number_of_threads(
         assert np.array_equal(a, b[back])
     for lane in range(300):
         assert np.array_equal(points[lane], others[back[lane]])
+
+
+@pytest.mark.parametrize("batching", [Batching(threads=1), Batching(threads=2), Batching(9)])
+def test_lanes_that_begin_where_others_end_are_the_same_bit_for_bit(batching):
+    """300 rays in q, and from those that arrive on to other shortenings."""
+    arch = em.Rod(elements=6, degree=6)
+    Theta, Delta = np.meshgrid(np.linspace(0.5, 1.3, 20), np.linspace(0.01, 0.4, 15))
+    start = np.zeros((600, 4))
+    start[:, 0], start[:, 1] = np.tile(Theta.ravel(), 2), np.tile(Delta.ravel(), 2)
+    start[:, 3] = np.sin(1.0)
+    velocity = np.zeros_like(start)
+    velocity[:300, 2], velocity[300:, 3] = 3.0, -0.3
+    start[300:, 2] = 3.0
+    z, found = arch.natural(start * [1, 1, 0, 1])
+    assert found.all()
+    line, given = ParameterLine(arch, start, velocity), []
+
+    def follow(ended, code, there):
+        going = (code == EventCode.ARRIVED) & (ended < 300)
+        given.append(ended[going] + 300)
+        return given[-1], there[going]
+
+    whole = trace(line, z, batching=batching, onwards=Onwards(300, follow))
+    first = trace(line.take(np.arange(300)), z[:300])
+    going = np.flatnonzero(first.code == EventCode.ARRIVED)
+    assert 0 < len(going) < 300
+    assert np.array_equal(np.sort(np.concatenate(given)), going + 300)
+    second = trace(line.take(going + 300), first.z[going])
+    for rows, part in ((np.arange(300), first), (going + 300, second)):
+        columns, points = outcome_columns(whole)
+        wanted, others = outcome_columns(part)
+        for a, b in zip(columns, wanted, strict=True):
+            assert np.array_equal(a[rows], b)
+        for own, row in enumerate(rows):
+            assert np.array_equal(points[row], others[own])
 
 
 def test_progress_is_reported_and_an_error_of_the_sink_cancels():

@@ -120,6 +120,10 @@ class Block:
         self._waiting, self.rows.state[ticks.WAITING] = (lanes, levels), 0
         self.rare.forget(lanes)
 
+    def begin_at(self, lanes: Some, z: Lanes) -> None:
+        """Starts of lanes that are not admitted yet."""
+        self._start[lanes] = z
+
     def drop(self, lanes: Some) -> None:
         """Take lanes out."""
         self.rows.stage[np.isin(self.rows.lanes, lanes)] = ENDED

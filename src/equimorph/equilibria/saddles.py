@@ -8,13 +8,13 @@ from enum import IntEnum
 
 import numpy as np
 
-from equimorph.arrays import Int, Lanes, Parameters, Some, Values
+from equimorph.arrays import Float, Int, Lanes, Numbers, Parameters, Some, Values
 from equimorph.columns import Columns
 from equimorph.equilibria.curves import growing_force
 from equimorph.equilibria.energy_barriers import Status
 from equimorph.equilibria.gradient_flow import Ending
 from equimorph.equilibria.settle import Guards, settle
-from equimorph.equilibria.trace import trace
+from equimorph.equilibria.trace import Onwards, trace
 from equimorph.equilibria.trace_options import EventCode, TraceOptions
 from equimorph.structures import Structure
 from equimorph.structures.metric import metric_length
@@ -99,6 +99,10 @@ STEPS = 150
 """Largest number of steps of one push."""
 
 
+NEAR = Guards(iterations=12)
+"""Corrections of the points where they return."""
+
+
 @dataclass(frozen=True)
 class Pairs(Columns):
     """Pairs of minima, each over one point of the parameter space, a pair per lane."""
@@ -134,25 +138,30 @@ def states_between(structure: Structure, pairs: Pairs) -> Met:
     minima that are joined by a valley this is a saddle as a rule.
     """
     ways = pairs.both_ways()
-    lanes, z = np.arange(len(ways.p)), ways.start
-    push = _pushes(structure, ways)
-    distance = ways.distance(structure)
+    count, push, distance = len(ways.p), _pushes(structure, ways), ways.distance(structure)
+    # the push changes sign where it vanishes
+    owner, leg = np.tile(np.arange(count), LEGS), np.arange(LEGS).repeat(count)
+    force = np.where(leg % 2, -1.0, 1.0)[:, None] * push[owner]
+    line = growing_force(structure, ways.p[owner], force, distance[owner])
+    met, lanes = [np.zeros((0, structure.size))], [np.zeros(0, int)]
+
+    def follow(
+        ended: Numbers, code: Numbers, z: Lanes
+    ) -> tuple[Some, Float[np.ndarray, "some size"]]:
+        back = code == EventCode.RETURNED
+        exact = settle(structure, z[back], ways.p[owner[ended[back]]], guards=NEAR)
+        good, z = ended[back][exact.found], exact.z[exact.found]
+        met.append(z)
+        lanes.append(good)
+        more = good < (LEGS - 1) * count
+        return good[more] + count, z[more]
+
+    starts = np.tile(ways.start, (LEGS, 1))
     options = steps_for(float(distance.min()))
-    met, pair = [np.zeros((0, structure.size))], [np.zeros(0, int)]
-    for _ in range(LEGS):
-        line = growing_force(structure, ways.p[lanes], push[lanes], distance[lanes])
-        led = trace(line, z, (), options)
-        back = np.flatnonzero(led.code == EventCode.RETURNED)
-        exact = settle(structure, led.z[back], ways.p[lanes[back]], guards=Guards(iterations=12))
-        good = back[exact.found]
-        met.append(exact.z[exact.found])
-        pair.append(lanes[good] % len(pairs.p))
-        # the push changes sign where it vanishes
-        push[lanes[good]] *= -1.0
-        lanes, z = lanes[good], exact.z[exact.found]
-        if len(lanes) == 0:
-            break
-    return Met(np.concatenate(met), np.concatenate(pair))
+    trace(line, starts, (), options, onwards=Onwards(count, follow))
+    lane = np.concatenate(lanes)
+    order = np.argsort(lane)
+    return Met(np.concatenate(met)[order], owner[lane[order]] % len(pairs.p))
 
 
 def _pushes(structure: Structure, pairs: Pairs) -> Lanes:

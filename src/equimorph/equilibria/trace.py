@@ -45,6 +45,18 @@ class Batching:
 
 
 @dataclass(frozen=True)
+class Onwards:
+    """Lanes that begin where others end: none waits until all of those have ended.
+
+    first: number of lanes that begin at once; follow: given lanes that ended with their codes and
+    last states, further lanes and their starts, each once. Threads call it at the same time.
+    """
+
+    first: int
+    follow: Callable[[Numbers, Names, Lanes], tuple[Some, Lanes]]
+
+
+@dataclass(frozen=True)
 class Traces:
     """How each lane ended, the events on its way, and its points if they were recorded."""
 
@@ -66,6 +78,7 @@ def trace(
     *,
     batching: Batching | None = None,
     progress: Progress | None = None,
+    onwards: Onwards | None = None,
 ) -> Traces:
     """Trace every lane from t = 0 until it arrives, returns or something ends it.
 
@@ -78,15 +91,19 @@ def trace(
     Whatever `progress` raises stops all threads and reaches the caller; only after
     `CancelledError` lanes that were not finished have the code `EventCode.CANCELLED`, and the
     rest are returned.
+
+    With `onwards` only the first lanes begin, and others where these end; see `Onwards`.
     """
     options, batching = options or TraceOptions(), batching or Batching()
-    count = max(1, min(batching.threads or threads(), len(z) // LANES_PER_THREAD))
-    queue = _Queue(len(z))
+    first = len(z) if onwards is None else onwards.first
+    count = max(1, min(batching.threads or threads(), first // LANES_PER_THREAD))
+    queue = _Queue(first)
     ledger = _Ledger.of(z)
-    capacity = max(1, min(batching.capacity, -(-len(z) // count)))
-    at_once = min(EVENTS_AT_ONCE, OF_A_LANE * len(z))
+    capacity = max(1, min(batching.capacity, -(-first // count)))
+    at_once = min(EVENTS_AT_ONCE, OF_A_LANE * first)
+    start = np.array(z)  # starts of further lanes are written there
     jobs = [
-        _Job(Block(curve, z, constraints, options, capacity, at_once), queue, ledger)
+        _Job(Block(curve, start, constraints, options, capacity, at_once), queue, ledger, onwards)
         for _ in range(count)
     ]
     try:
@@ -146,6 +163,7 @@ class _Job:
     block: Block
     queue: _Queue
     ledger: _Ledger
+    onwards: Onwards | None = None
     again: list[int] = field(default_factory=list)
     passed: list[tuple[Events, Some]] = field(default_factory=list)
     missed: dict[int, str] = field(default_factory=dict)
@@ -168,9 +186,15 @@ class _Job:
         if block.busy:
             self._lose(block.run(self._more))
         waiting = block.rows.events.count + len(block.rare.hidden)
-        if waiting >= (block.most_events if block.busy else 1):
+        if waiting and (waiting >= self._patience or not block.busy):
             self._locate()
         return block.busy or self._more
+
+    @property
+    def _patience(self) -> int:
+        """Events that wait until they are located together: those of most lanes, if others wait."""
+        block = self.block
+        return block.most_events if self.onwards is None else max(block.rows.active, 1)
 
     @property
     def _more(self) -> bool:
@@ -245,6 +269,10 @@ class _Job:
         some = events.take(passing)
         self.passed.append((some, ledger.retries[some.lanes]))
         self.queue.finish(len(at))
+        if self.onwards is not None and len(at):
+            further, start = self.onwards.follow(at, ledger.code[at], ledger.z[at])
+            self.block.begin_at(further, start)
+            self.again.extend(further.tolist())
 
 
 def _run(jobs: list[_Job], queue: _Queue, progress: Progress) -> None:
