@@ -7,6 +7,7 @@ import equimorph as em
 from equimorph.equilibria import minima_graph, random_search
 from equimorph.equilibria.minima_graph import MinimaGraph
 from equimorph.equilibria.random_search import Ground
+from equimorph.equilibria.saddles import Met
 from oracles.close_states import close_roots, close_sheets, truss_row
 from oracles.polynomial import bead_on_a_circle
 
@@ -98,6 +99,30 @@ def test_saddles_are_found_between_minima_alone():
     assert graph.pieces(0)[1].max() == 3
     graph.connect()
     assert graph.pieces(0)[1].max() == 0
+
+
+def test_pairs_are_tried_at_once_that_would_be_tried_in_turn(monkeypatch):
+    """Where no saddle is found, from the minima of a row of three: none is left out."""
+    truss = truss_row(3, 0)
+    found = em.find_equilibria(truss, {"F": 0.0})
+    minima = found.z[found.index == 0]
+    nothing = Met(minima[:0], np.zeros(0, int))
+    tried, rounds = [], []
+    for at_once in (1, 6):
+        given = []
+
+        def fail(structure, pairs, given=given):
+            given.append(pairs)
+            return nothing
+
+        monkeypatch.setattr(minima_graph, "AT_ONCE", at_once)
+        monkeypatch.setattr(minima_graph, "states_between", fail)
+        graph = graph_of(truss, minima, found.p[0])
+        graph.connect()
+        tried.append(graph.tried[0])
+        rounds.append(len(given))
+    assert tried[0] <= tried[1]
+    assert rounds[1] < rounds[0]
 
 
 def test_constraints_and_promises_are_named():

@@ -27,7 +27,8 @@ from equimorph.tolerances import SAME_STATE
 TRIES = 60
 """Pairs of minima over one point between which a saddle is searched, at most."""
 AT_ONCE = 6
-"""Of these at the same time."""
+"""Of these at the same time: those that would be tried one after the other if all failed. One pair
+at a time, as between two pieces, took half as many steps more for a frame in space."""
 ROUNDS = 12
 """Rounds of descents from the saddles that the round before has found, at most."""
 NONE = -1
@@ -150,8 +151,6 @@ class MinimaGraph:
             if not pairs:
                 return
             group, start, goal = np.array(pairs, int).T
-            for each, *pair in pairs:
-                self._note(each, *pair)
             given = Pairs(self.z[start], self.z[goal], self.ground.p[group])
             met = states_between(self.ground.structure, given)
             good = self.ground.structure.resolved(met.z, given.p[met.pair])
@@ -169,10 +168,22 @@ class MinimaGraph:
         """Pairs of minima of one orbit, not tried: other orbits lie between them."""
         tried, own = self.tried[group], (self.group == group) & (self.index == 0)
         pairs = {(min(pair), max(pair)) for pair in self._orbits if own[pair[0]]}
-        return sorted(pairs - tried)
+        chosen = sorted(pairs - tried)
+        for pair in chosen:
+            self._note(group, *pair)
+        return chosen
 
     def _gaps(self, group: int) -> list[Pair]:
         """Pairs of minima of different pieces that are tried next."""
+        chosen: list[Pair] = []
+        while len(chosen) < AT_ONCE and (more := self._shortest_gaps(group)):
+            for pair in more[: AT_ONCE - len(chosen)]:
+                self._note(group, *pair)
+                chosen.append(pair)
+        return chosen
+
+    def _shortest_gaps(self, group: int) -> list[Pair]:
+        """Shortest gaps, not tried, of the best chains of minima from one piece to the others."""
         minima, piece = self.pieces(group)
         left = TRIES - len(self.tried[group])
         if piece.max(initial=0) == 0 or left <= 0:
@@ -189,7 +200,7 @@ class MinimaGraph:
         length, before = dijkstra(graph, indices=0, return_predecessors=True)
         ends = [np.flatnonzero(piece == k)[0] for k in range(piece.max() + 1) if k != piece[0]]
         chosen = {_shortest(gaps, before, int(end)) for end in ends if np.isfinite(length[end])}
-        return [(int(minima[i]), int(minima[j])) for i, j in sorted(chosen)][: min(left, AT_ONCE)]
+        return [(int(minima[i]), int(minima[j])) for i, j in sorted(chosen)][:left]
 
 
 def _shortest(gaps: Float[np.ndarray, "n n"], before: Items, end: int) -> Pair:
