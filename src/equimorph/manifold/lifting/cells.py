@@ -116,7 +116,7 @@ def _with_discs(new: Discs, known: Discs, same: Bool[np.ndarray, " T"]) -> Discs
     kept = same[known.owner]
     sides = sides_of(known.corners[kept])
 
-    def join(name: str) -> Int[np.ndarray, "..."]:
+    def join(name: str) -> np.ndarray:
         return np.concatenate([getattr(new, name), getattr(known, name)[kept]])
 
     def marked(name: str) -> Pairs:

@@ -121,7 +121,7 @@ def _distinct(pairs: Pairs, chords: set[Chord], base: int) -> Int[np.ndarray, "m
     return rows_of(np.unique(keys), base, 2)
 
 
-def sides_of(corners: Triples) -> Pairs:
+def sides_of(corners: Triples) -> Int[np.ndarray, "sides 2"]:
     """Sides ab, bc, ca of triangles, one triangle after the other."""
     return corners[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
 
