@@ -7,9 +7,11 @@ import numpy as np
 
 from equimorph.arrays import Flags, Float, Lanes, Nodal, Parameters, Scalars
 from equimorph.linalg.dense import multiply
+from equimorph.linalg.lanes import over_lanes
 from equimorph.model import Forces, Support
 from equimorph.model.drawing import supports_of_point
 from equimorph.structures.frame.any_frame import AnyFrame
+from equimorph.structures.frame.kernels import moments_lanes
 from equimorph.structures.frame.mechanics import FrameMechanics, Points
 from equimorph.structures.frame.model import FrameModel
 from equimorph.structures.frame.strength import Nodal as NodalForces, NodalStrains
@@ -127,23 +129,27 @@ class FrameFields(FrameMechanics, AnyFrame):
         Ends of elements carry what the element's nodal forces say; inside ``M' = (1 + e) (f × t)``
         is integrated from both ends, and the remaining difference is distributed in proportion.
         """
-        model, (y, turns, strain) = self.model, self._fields(z, p)
-        pulls = self._pulls(y, self._turned(turns), strain)
-        stretch = 1.0 + strain + model.softness * pulls.tension
-        shear = (stretch * pulls.shear).reshape(len(z), *model.nodes.shape)
-        local = np.einsum("eij,lej->lei", model.stiffness, turns[:, model.nodes]) - shear
+        given = [np.ascontiguousarray(each) for each in (z, p)]
+        pressed = np.zeros((len(z), 0))
         if self.pressure is not None:
-            local += self.pressure.point_moments(y, turns).reshape(local.shape)
-            shear += (model.weights * self._pressed(y, turns)[1]).reshape(local.shape)
-        actuated = multiply(y, model.natural.T) * model.rigidity
-        extra = np.repeat(actuated, model.mesh.elements, axis=1)
-        first, last = -local[:, :, 0] - extra, local[:, :, -1] - extra
-        density = shear / model.weights.reshape(model.nodes.shape)
-        lengths = np.outer(model.lengths, model.mesh.lengths).ravel()[:, None]
-        change = -np.einsum("ij,lej->lei", model.mesh.reference.integral, density) * lengths
-        gap = last - first - change[:, :, -1]
-        inside = first[:, :, None] + change + gap[:, :, None] * model.mesh.reference.nodes
-        return np.asarray(inside.reshape(len(z), *self._elements))
+            y, turns, _ = self._fields(z, p)
+            forces = self.model.weights * self._pressed(y, turns)[1]
+            pressed = np.concatenate([self.pressure.point_moments(y, turns), forces], axis=1)
+        out = np.empty((len(z), self.model.nodes.size))
+        if len(z):
+            over_lanes(moments_lanes, self._moment_tables, [*given, pressed], [out])
+        return out.reshape(len(z), *self._elements)
+
+    @cached_property
+    def _moment_tables(self) -> tuple[np.ndarray, ...]:
+        """What the kernel of bending moments shares among lanes."""
+        model, mesh = self.model, self.model.mesh
+        arrays = (
+            model.stiffness, model.natural * model.rigidity[:, None], model.weights,
+            np.outer(model.lengths, mesh.lengths).ravel(), mesh.reference.integral,
+            mesh.reference.nodes,
+        )  # fmt: skip
+        return *self.tables.of_points, *(np.ascontiguousarray(array) for array in arrays)
 
     def elastic(self, z: Lanes, p: Parameters) -> tuple[NodalStrains, NodalForces]:
         """Elastic curvatures about b at the nodes, nothing about other axes, and axial forces."""

@@ -226,6 +226,76 @@ def second_lanes(
 
 
 @njit(**INNER)
+def _point_forces(m, at, node, softness, sine, cosine, which, ties, psi, scalars, strain, density):
+    """Add (1 + e + γP) P' at a point of a member to a density; the strain is 1 + e."""
+    s, c = sincos(load(psi, node))
+    a, b = spread(0.0), spread(0.0)
+    for r in range(ties[m, 1]):
+        y = load(scalars, which[m, r])
+        a, b = a + spread(sine[at, r]) * y, b + spread(cosine[at, r]) * y
+    stretch = strain + spread(softness[at]) * (a * s + b * c)
+    _add(density, at, stretch * (a * c - b * s))
+
+
+@njit(**INNER)
+def _integrate(e, order, first, last, lengths, integral, shares, weights, density, moments):
+    """Moments in an element between those at its ends, from the density of their change."""
+    for i in range(order):
+        change = spread(0.0)
+        for j in range(order):
+            at = e * order + j
+            change = change - spread(integral[i, j] * lengths[e] / weights[at]) * load(density, at)
+        store(moments, e * order + i, first + change)
+    gap = last - load(moments, e * order + order - 1)
+    for i in range(order):
+        _add(moments, e * order + i, gap * spread(shares[i]))
+
+
+@njit(**FLAGS)
+def moments_lanes(
+    nodes, place, softness, sine, cosine, which, ties, stretch, turned, stiffness, actuated,
+    weights, lengths, integral, shares, z, p, pressed, out,
+):  # fmt: skip
+    """Bending moments at the nodes of every element; see `FrameFields._moments`.
+
+    actuated: moments of each member that are held free of stress, by scalar; pressed, none or at
+    each point: what pressures add to the nodal moments, and to the density of their change.
+    """
+    lanes, size = z.shape
+    members, (count, order) = len(which), nodes.shape
+    elements, points, scalars = count // members, count * order, turned.shape[1]
+    y, psi, rows = work_rows(scalars), work_rows(len(place)), work_rows(size)
+    density, moments = work_rows(points), work_rows(points)
+    loaded = work_rows(max(pressed.shape[1], 1))
+    for block in range(0, lanes, LANES):
+        lane = min(block, lanes - LANES)
+        _read_state(z, p, lane, 1.0, turned, place, rows, y, psi)
+        width = pressed.shape[1]
+        read_lanes(pressed, lane * width, width, width, loaded, 0, 1)
+        density[:] = 0.0
+        for e in range(count):
+            m, begin, end = e // elements, e * order, e * order + order - 1
+            strain = spread(1.0) + _combined(stretch, m, y)
+            for i in range(order):
+                _point_forces(
+                    m, begin + i, nodes[e, i], softness, sine, cosine, which, ties, psi, y, strain,
+                    density,
+                )  # fmt: skip
+            held = _combined(actuated, m, y)
+            first, last = load(density, begin) - held, spread(0.0) - load(density, end) - held
+            for j in range(order):
+                turn = load(psi, nodes[e, j])
+                first = first - spread(stiffness[e, 0, j]) * turn
+                last = last + spread(stiffness[e, order - 1, j]) * turn
+            if width > 0:
+                first, last = first - load(loaded, begin), last + load(loaded, end)
+                for at in range(begin, end + 1):
+                    _add(density, at, load(loaded, points + at))
+            _integrate(e, order, first, last, lengths, integral, shares, weights, density, moments)
+        write_lanes(moments, 0, 1, out, lane * points, points, points)
+
+
+@njit(**INNER)
 def _write(place, values, rows, target, lane):
     """Write values at the unknown nodes and of the multipliers behind the nodes."""
     count, size = len(place), target.shape[1]

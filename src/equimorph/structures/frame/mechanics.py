@@ -161,8 +161,8 @@ class Tables:
         return tuple(np.ascontiguousarray(array) for array in arrays)
 
     @cached_property
-    def of_second(self) -> tuple[np.ndarray, ...]:
-        """What the kernel of second derivatives shares among lanes."""
+    def of_points(self) -> tuple[np.ndarray, ...]:
+        """What kernels of second derivatives and moments share among lanes."""
         model = self.model
         arrays = (
             model.nodes, model.place, model.softness, self._compact(model.sine),
@@ -331,7 +331,7 @@ class FrameMechanics(DiscreteStructure):
         given = [np.ascontiguousarray(each) for each in (z, p, *v, *w)]
         out = np.empty(given[0].shape)
         if len(out):
-            over_lanes(second_lanes, self.tables.of_second, given, [out])
+            over_lanes(second_lanes, self.tables.of_points, given, [out])
         if self.pressure is not None:
             (y, turns, _), *both = (
                 self._fields(*each, constant)
