@@ -96,14 +96,20 @@ class Walk(Columns):
         there = replace(
             there, z=np.where(known, there.z, self.z), p=np.where(known, there.p, self.p)
         )
-        tangent, rows = _tangents(setting, self.cap, self.corners, there.z, there.p, self.rows)
-        cosine = (tangent_rows(setting, tangent) * tangent_rows(setting, self.tangent)).sum(axis=1)
         off = np.linalg.norm(
             embed(setting, there.z, there.p) - embed(setting, guess.z, guess.p), axis=1
         )
-        good = there.found & (off < OFF * length) & (np.abs(cosine) > STRAIGHT)
+        good = there.found & (off < OFF * length)
         # a step that is bent out of the triangle passed the side
         good &= leaves | (shares_in(self.corners, there.p[:, setting.free]).min(axis=1) > -BEYOND)
+        tangent, rows, cosine = self.tangent.copy(), self.rows.copy(), np.zeros(len(way))
+        if len(near := np.flatnonzero(good)):
+            own, at = self.take(near), there.take(near)
+            found = _tangents(setting, self.cap, own.corners, at.z, at.p, own.rows)
+            tangent[near], rows[near] = found
+            alike = tangent_rows(setting, found[0]) * tangent_rows(setting, own.tangent)
+            cosine[near] = alike.sum(axis=1)
+        good &= np.abs(cosine) > STRAIGHT
         moved = replace(
             self, z=there.z, p=there.p, tangent=tangent * np.copysign(1.0, cosine)[:, None],
             rows=rows, length=2.0 * length, start=np.full(len(self.z), -1),
