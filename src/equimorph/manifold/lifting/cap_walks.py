@@ -37,7 +37,11 @@ STEPS = 120
 KINK = 1e-4
 """Length of a step in the embedding below which one that fails has met a kink."""
 PAST = 8.0
-"""Length of the first step behind a kink, in that of the last one before it."""
+"""Length of the first step behind a kink, in that of the last one before it; longer where the
+constraint that acts behind takes over farther along itself."""
+ASIDE = 4.0
+"""How far from a kink slopes are taken, before it and behind, in lengths of the step that is not
+taken yet: one of two lengths met it. Differences across it mean nothing."""
 BENT = 0.02
 """Sine of the angle of a kink from which on it is one."""
 
@@ -97,27 +101,27 @@ def _follow(pairing: Pairing, triangle: Items, cap: Items) -> list[CapExit | Non
 
 
 def _past_kinks(setting: Setting, walk: Walk, inside: Bool[np.ndarray, " n"]) -> Walk:
-    """Turn those walks that are stuck at kinks, along the constraint that acts behind.
-
-    If that rises ahead, the larger one of both acts: the first falls on the way on, else it rises.
-    """
+    """Turn those walks that are stuck at kinks, along the constraint that acts behind."""
     lanes = np.flatnonzero(inside & (walk.length < KINK))
     if len(lanes) == 0:
         return walk
     stuck = walk.take(lanes)
     frames = tangent_frames(setting, stuck.z, stuck.p, stuck.rows)
-    dz, dp = split_step(setting, 2.0 * stuck.length[:, None] * stuck.tangent)
-    here = cap_slopes(setting, stuck.z, stuck.p, frames)
+    dz, dp = split_step(setting, ASIDE * stuck.length[:, None] * stuck.tangent)
+    here = cap_slopes(setting, stuck.z - dz, stuck.p - dp, frames)
     there = cap_slopes(setting, stuck.z + dz, stuck.p + dp, frames)
     along = directions(setting, stuck.corners, frames, there)
-    off = (along * here).sum(axis=1) / np.maximum(np.linalg.norm(here, axis=1), 1e-300)
+    falls = (along * here).sum(axis=1)
     rows = frames_in_embedding(setting, frames)
     ahead = (np.einsum("nkc,nc->nk", rows, tangent_rows(setting, stuck.tangent)) * there).sum(
         axis=1
     )
-    tangent = np.einsum("nk,nkf->nf", -np.sign(off * ahead)[:, None] * along, frames)
-    turned = replace(stuck, tangent=tangent, length=PAST * stuck.length)
-    return walk.with_rows(lanes, turned.where(np.abs(off) > BENT, stuck))
+    tangent = np.einsum("nk,nkf->nf", along, frames)
+    # the other one acts once the first has fallen by as much as the other rises up to the kink
+    farther = np.maximum(np.abs(ahead) / np.maximum(np.abs(falls), 1e-300), 1.0)
+    turned = replace(stuck, tangent=tangent, length=PAST * farther * stuck.length)
+    bent = np.abs(falls) > BENT * np.linalg.norm(here, axis=1)
+    return walk.with_rows(lanes, turned.where(bent, stuck))
 
 
 @dataclass

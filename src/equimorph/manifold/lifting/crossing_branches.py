@@ -31,9 +31,10 @@ DISTANCES = (0.03, 0.003, 0.0003, 3e-5, 3e-6)
 """Lengths of the first step from a crossing, in the metric, tried one after the other: of
 1852 half-branches 1346 began with the first, 290 with the second, 160 with the third. Shorter are
 the arcs of crossings that a constraint nearly meets."""
-TURNS = 2
+TURNS = 8
 """How often a new curve is followed until it turns back: of 1796 half-branches 1438 reached a
-vertex at once, 33 after one turn, and none of six after more."""
+vertex at once, 33 after one turn, and none of six after more, which are rings. Arcs over layers
+have up to three folds (set 511 of the soak)."""
 CURVES = 2
 """Through each crossing."""
 HALVES = 2
@@ -142,14 +143,15 @@ def lead_out(
 ) -> tuple[Seeds, Inside, dict[int, Place]]:
     """Equilibria over vertices that half-branches over edges lead to, and points inside edges.
 
-    And where those first turn back that run round rings. Half-branches are given by their numbers,
-    with points near their beginnings; these numbers are the lanes of the points inside, which are
-    in order.
+    And where those first turn back that run round rings: they come back to where they began.
+    Half-branches are given by their numbers, with points near their beginnings; these numbers are
+    the lanes of the points inside, which are in order.
     """
     mesh, setting = pairing.mesh, pairing.setting
     reached, met, turns = [], [], dict[int, Place]()
     towards = (front.tangent_t > 0.0).astype(int)
     z, p = front.z, line.parameters(front.t)
+    start, rings = z, list[int]()
     for _ in range(TURNS):
         goal = mesh.edges[edges, towards]
         way = setting.parameters(mesh.vertices[goal]) - p
@@ -168,14 +170,17 @@ def lead_out(
             turns.setdefault(int(halves[lane]), ways.start[lane] + t * ways.velocity[lane])
         there = outcome.code == EventCode.ARRIVED
         reached.append(polish(setting, mesh, goal[there], outcome.z[there])[0])
-        back = np.flatnonzero(outcome.code == EventCode.RETURNED)
+        back = outcome.code == EventCode.RETURNED
+        around = back & (metric_length(setting.structure, outcome.z - start) < NOISE)
+        rings.extend(halves[around].tolist())
+        back = np.flatnonzero(back & ~around)
         z, p, edges, towards = outcome.z[back], p[back], edges[back], 1 - towards[back]
-        halves = halves[back]
+        halves, start = halves[back], start[back]
         if len(back) == 0:
             break
     vertices, z, p, index = (np.concatenate(column) for column in zip(*reached, strict=True))
-    rings = {half: turns[half] for half in halves.tolist() if half in turns}
-    return (vertices, z, p, index), Inside.concatenate(met), rings
+    closed = {half: turns[half] for half in (*rings, *halves.tolist()) if half in turns}
+    return (vertices, z, p, index), Inside.concatenate(met), closed
 
 
 def _starts(

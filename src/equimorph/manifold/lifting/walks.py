@@ -41,7 +41,8 @@ class Walk(Columns):
     """Points of folds, or of where a constraint acts, in triangles.
 
     cap: whether it is a constraint; tangent: of unit length in the embedding, with changes of z and
-    of the scaled free parameters; rows: a basis, in the embedding, of a space near that of the set;
+    of the scaled free parameters; rows: a basis, in the embedding, of a space near that of the set,
+    of a constraint with an orientation by which its excess rises on the same side all the way;
     length: of the next step, at most; start: number of the corner opposite the side of the first
     point, −1 later; low: index on the lower side of a fold.
     """
@@ -69,7 +70,9 @@ class Walk(Columns):
         side = shares_in(corners, p[:, setting.free]).argmin(axis=1)
         walk = cls(cap, corners, z, p, tangent, rows, np.full(len(z), np.inf), side, low)
         inwards = np.take_along_axis(walk.rates(setting), side[:, None], axis=1)
-        return replace(walk, tangent=tangent * np.copysign(1.0, inwards))
+        sense = np.copysign(1.0, inwards)
+        rows[:, 0] *= sense
+        return replace(walk, tangent=tangent * sense)
 
     def rates(self, setting: Setting) -> Float[np.ndarray, "n 3"]:
         """Changes of the barycentric coordinates along the tangents."""
@@ -109,10 +112,12 @@ class Walk(Columns):
             tangent[near], rows[near] = found
             alike = tangent_rows(setting, found[0]) * tangent_rows(setting, own.tangent)
             cosine[near] = alike.sum(axis=1)
-        good &= np.abs(cosine) > STRAIGHT
+        if not self.cap:  # null vectors have no orientation
+            tangent, cosine = tangent * np.copysign(1.0, cosine)[:, None], np.abs(cosine)
+        good &= cosine > STRAIGHT
         moved = replace(
-            self, z=there.z, p=there.p, tangent=tangent * np.copysign(1.0, cosine)[:, None],
-            rows=rows, length=2.0 * length, start=np.full(len(self.z), -1),
+            self, z=there.z, p=there.p, tangent=tangent, rows=rows, length=2.0 * length,
+            start=np.full(len(self.z), -1),
         )  # fmt: skip
         # where it leads inwards a point on a side is the first one, or another one of that side
         outwards = np.take_along_axis(moved.rates(setting), apex[:, None], axis=1)[:, 0] < 0.0
@@ -183,7 +188,10 @@ def _tangents(
     p: Parameters,
     rows: Float[np.ndarray, "n d coordinates"],
 ) -> tuple[Full, Float[np.ndarray, "n d coordinates"]]:
-    """Unit tangents, of either sense, of curves in the planes of triangles; bases of the set's."""
+    """Unit tangents of curves in the planes of triangles, and bases of the tangent spaces.
+
+    Those of folds have either sense; a constraint rises on one side, by the rows' orientation.
+    """
     if cap:
         frames = tangent_frames(setting, z, p, rows)
         held = cap_slopes(setting, z, p, frames)
@@ -202,11 +210,15 @@ def directions(
     frames: Float[np.ndarray, "n d full"],
     slope: Float[np.ndarray, "n d"],
 ) -> Float[np.ndarray, "n d"]:
-    """Unit vectors, of either sense, in frames: across slopes and in the planes of triangles."""
-    held = slope[:, None] / np.maximum(np.linalg.norm(slope, axis=1), 1e-300)[:, None, None]
-    if len(setting.free) > corners.shape[1] - 1:  # no step leaves the plane
+    """Unit vectors, in frames, across slopes and in the planes of triangles.
+
+    The slopes are on their right over two parameters; over three as the planes' normals tell.
+    """
+    if len(setting.free) == corners.shape[1] - 1:
+        along = np.stack([-slope[:, 1], slope[:, 0]], axis=1)
+    else:
         span = plane_bases(corners / setting.scales)
         normal = np.cross(span[:, 0], span[:, 1])
-        across = np.einsum("nkd,nd->nk", frames[:, :, -len(setting.free) :], normal)[:, None]
-        held = np.concatenate([held, across], axis=1)
-    return np.asarray(np.linalg.svd(held)[2][:, -1])
+        along = np.cross(slope, np.einsum("nkd,nd->nk", frames[:, :, -len(setting.free) :], normal))
+    size = np.linalg.norm(along, axis=1, keepdims=True)
+    return np.asarray(along / np.maximum(size, 1e-300))
