@@ -26,7 +26,7 @@ from equimorph.manifold.geometry.tangents import (
     tangent_frames,
 )
 from equimorph.manifold.lifting.courses import on_sides
-from equimorph.manifold.lifting.fold_walks import nearest_at
+from equimorph.manifold.lifting.fold_walks import nearest_at, points_over
 from equimorph.manifold.lifting.pairing import CapExit, Pairing
 from equimorph.manifold.lifting.polygon_cuts import planes
 from equimorph.manifold.lifting.polygons import Polygon
@@ -34,7 +34,7 @@ from equimorph.manifold.lifting.walks import Walk, directions, tangent_rows
 
 STEPS = 120
 """Steps that are tried, at most: one without kinks takes some 10, and each kink as many again."""
-KINK = 1e-4
+KINK = 1e-3
 """Length of a step in the embedding below which one that fails has met a kink."""
 PAST = 8.0
 """Length of the first step behind a kink, in that of the last one before it; longer where the
@@ -65,10 +65,7 @@ def cap_exits(pairing: Pairing, pairs: Sequence[tuple[int, int]]) -> list[CapExi
 
 def cap_at(pairing: Pairing, exit_: CapExit) -> int:
     """Number of the known point at which a constraint leaves a triangle, −1 if there is none."""
-    store = pairing.points
-    own = store.edge[: store.count] == exit_.edge
-    own &= store.kind[: store.count] == VertexKind.CAP
-    return nearest_at(pairing, [exit_], np.flatnonzero(own))[0]
+    return nearest_at(pairing, [exit_], points_over(pairing, exit_.edge, VertexKind.CAP))[0]
 
 
 def _follow(pairing: Pairing, triangle: Items, cap: Items) -> list[CapExit | None]:
@@ -158,7 +155,8 @@ def _linked(
     triangle = chains[0].triangle
     partner: dict[int, int] = {}
     astray = []
-    for end in (end for chain in chains for end in (chain.points[0], chain.points[-1])):
+    ends = [end for chain in chains for end in (chain.points[0], chain.points[-1])]
+    for end in ends:
         exit_ = exits[triangle, end]
         if exit_ is not None:
             partner[end] = cap_at(pairing, exit_)
@@ -167,7 +165,7 @@ def _linked(
     # a way that was lost from one end may be known from the other
     partner = {other: end for end, other in partner.items() if other >= 0} | partner
     mutual = all(partner.get(other) == end for end, other in partner.items())
-    if not mutual or len(partner) != 2 * len(chains):
+    if not mutual or partner.keys() != set(ends):
         own = {end: other for chain in chains for end, other in _both_ways(chain)}
         return Linked(None, astray, not astray and partner.items() <= own.items())
     return Linked(list(_cycles(chains, partner)), [], False)

@@ -7,7 +7,7 @@ See docs/decisions.md, "Sheets that cross are lifted one by one".
 """
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -120,11 +120,9 @@ def _beyond(pairing: Pairing, alone: Int[np.ndarray, " crossings"]) -> Seeds:
     line = edge_lines(pairing, pairing.points.edge[alone])
     halves, front = _starts(pairing, alone, line)
     owner = halves // (CURVES * HALVES)
-    seeds, met, _ = lead_out(
-        pairing, halves, pairing.points.edge[alone[owner]], line.take(owner), front
-    )
-    _enter_arcs(pairing, alone, met)
-    return seeds
+    led = lead_out(pairing, halves, pairing.points.edge[alone[owner]], line.take(owner), front)
+    _enter_arcs(pairing, alone, led.met)
+    return led.seeds
 
 
 def edge_lines(pairing: Pairing, edges: Items) -> ParameterLine:
@@ -134,25 +132,35 @@ def edge_lines(pairing: Pairing, edges: Items) -> ParameterLine:
     return ParameterLine(setting.structure, ends[:, 0].copy(), ends[:, 1] - ends[:, 0])
 
 
+@dataclass(frozen=True)
+class LedOut:
+    """Where half-branches over edges lead to.
+
+    seeds: equilibria over vertices; straight: the half-branch of each that comes there without any
+    event, else −1; met: points inside edges, in order along half-branches, whose numbers are their
+    lanes; rings: where those first turn back that come back to where they began.
+    """
+
+    seeds: Seeds
+    straight: Items
+    met: Inside
+    rings: dict[int, Place]
+
+
 def lead_out(
     pairing: Pairing,
     halves: Int[np.ndarray, " m"],
     edges: Int[np.ndarray, " m"],
     line: ParameterLine,
     front: Front,
-) -> tuple[Seeds, Inside, dict[int, Place]]:
-    """Equilibria over vertices that half-branches over edges lead to, and points inside edges.
-
-    And where those first turn back that run round rings: they come back to where they began.
-    Half-branches are given by their numbers, with points near their beginnings; these numbers are
-    the lanes of the points inside, which are in order.
-    """
+) -> LedOut:
+    """Follow half-branches over edges, by their numbers, from points near their beginnings."""
     mesh, setting = pairing.mesh, pairing.setting
-    reached, met, turns = [], [], dict[int, Place]()
+    reached, straight, met, turns = [], [], [], dict[int, Place]()
     towards = (front.tangent_t > 0.0).astype(int)
     z, p = front.z, line.parameters(front.t)
     start, rings = z, list[int]()
-    for _ in range(TURNS):
+    for turn in range(TURNS):
         goal = mesh.edges[edges, towards]
         way = setting.parameters(mesh.vertices[goal]) - p
         # recorded: a regular point between two singular ones begins at a state on the way
@@ -168,8 +176,11 @@ def lead_out(
             *(each[passed.code == EventCode.FOLD] for each in (passed.lanes, passed.t)), strict=True
         ):
             turns.setdefault(int(halves[lane]), ways.start[lane] + t * ways.velocity[lane])
-        there = outcome.code == EventCode.ARRIVED
-        reached.append(polish(setting, mesh, goal[there], outcome.z[there])[0])
+        there = np.flatnonzero(outcome.code == EventCode.ARRIVED)
+        seeds, good = polish(setting, mesh, goal[there], outcome.z[there])
+        reached.append(seeds)
+        bent = np.isin(there, passed.lanes) | (turn > 0)
+        straight.append(np.where(bent, -1, halves[there])[good])
         back = outcome.code == EventCode.RETURNED
         around = back & (metric_length(setting.structure, outcome.z - start) < NOISE)
         rings.extend(halves[around].tolist())
@@ -180,7 +191,8 @@ def lead_out(
             break
     vertices, z, p, index = (np.concatenate(column) for column in zip(*reached, strict=True))
     closed = {half: turns[half] for half in (*rings, *halves.tolist()) if half in turns}
-    return (vertices, z, p, index), Inside.concatenate(met), closed
+    seeds = vertices, z, p, index
+    return LedOut(seeds, np.concatenate(straight), Inside.concatenate(met), closed)
 
 
 def _starts(

@@ -113,10 +113,16 @@ def _corners(pairing: Pairing, walk: Walk, fold: Items) -> Pinned:
 
 def fold_at(pairing: Pairing, exit_: FoldExit) -> int:
     """Number of the known fold where a fold leaves a triangle, −1 if there is none."""
-    store = pairing.points
-    own = store.edge[: store.count] == exit_.edge
-    folds = np.flatnonzero(own & (store.kind[: store.count] == VertexKind.FOLD))
-    return nearest_at(pairing, [exit_], folds)[0]
+    return nearest_at(pairing, [exit_], points_over(pairing, exit_.edge, VertexKind.FOLD))[0]
+
+
+def points_over(pairing: Pairing, edge: int, kind: VertexKind) -> Items:
+    """Points of a kind on the curves and arcs over an edge; not those of curves taken back."""
+    curves = pairing.curves
+    live = [each for each in np.flatnonzero(curves.edge == edge).tolist() if pairing.alive(each)]
+    lines = [*(curves.inner.get(each, ()) for each in live), *pairing.arcs.get(edge, ())]
+    own = np.array([point for line in lines for point in line], int)
+    return np.asarray(own[pairing.points.kind[own] == kind])
 
 
 def nearest_at(pairing: Pairing, exits: Sequence[FoldExit | CapExit], points: Some) -> list[int]:

@@ -18,6 +18,7 @@ from equimorph.manifold.lifting.cap_walks import cap_at, cap_exits
 from equimorph.manifold.lifting.cells import CellFinder, Cells, Close
 from equimorph.manifold.lifting.crossing_branches import (
     HALVES,
+    LedOut,
     edge_lines,
     first_steps,
     flood_crossings,
@@ -26,7 +27,7 @@ from equimorph.manifold.lifting.crossing_branches import (
 from equimorph.manifold.lifting.edges import Inside
 from equimorph.manifold.lifting.fold_walks import NOISE, fold_at, fold_exits
 from equimorph.manifold.lifting.grid import NEAR_AN_END
-from equimorph.manifold.lifting.pairing import FoldExit, Pairing
+from equimorph.manifold.lifting.pairing import CapExit, FoldExit, Pairing
 from equimorph.model import Progress
 from equimorph.structures.metric import metric_length
 
@@ -62,7 +63,33 @@ def _enter_at_constraints(pairing: Pairing, pairs: Sequence[tuple[int, int]]) ->
     new = [each for each in exits if cap_at(pairing, each) < 0]
     if not new:
         return False
-    edge, z, p = (np.array([getattr(each, name) for each in new]) for name in ("edge", "z", "p"))
+    led = _led_from_constraints(pairing, new)
+    store, met = pairing.points, led.met
+    count = store.count
+    reached, _ = store.over_vertices(*led.seeds)
+    pairing.fit()
+    for half in np.unique(met.lanes[met.kinds == VertexKind.CAP]).tolist():
+        own, each = met.take(met.lanes == half), new[half // HALVES]
+        if cap_at(pairing, each) < 0 and VertexKind.CROSSING not in own.kinds:
+            start = _add(pairing, each)
+            rest = store.add_many(own.z, own.p, own.index, own.kinds, each.edge)
+            pairing.arcs.setdefault(each.edge, []).append((start, *rest.tolist()))
+    direct = led.straight >= 0
+    for half, point in zip(led.straight[direct].tolist(), reached[direct].tolist(), strict=True):
+        each = new[half // HALVES]
+        if cap_at(pairing, each) < 0:
+            _end_at_constraint(pairing, point, each.edge, _add(pairing, each))
+    pairing.fit()
+    tried = {id(each) for each in new if cap_at(pairing, each) < 0}
+    for key, one in pairing.cap_exits.items():
+        if id(one) in tried:
+            pairing.cap_exits[key] = None
+    return store.count > count
+
+
+def _led_from_constraints(pairing: Pairing, exits: Sequence[CapExit]) -> LedOut:
+    """Follow the curves over edges both ways from points on constraints."""
+    edge, z, p = (np.array([getattr(each, name) for each in exits]) for name in ("edge", "z", "p"))
     owner, sense = np.divmod(np.arange(HALVES * len(z)), HALVES)
     line = edge_lines(pairing, edge)
     t = np.array([_share(pairing, *each) for each in zip(edge.tolist(), p, strict=True)])
@@ -73,21 +100,25 @@ def _enter_at_constraints(pairing: Pairing, pairs: Sequence[tuple[int, int]]) ->
     tangents = (sign / norm[owner])[:, None] * along[owner], sign / norm[owner]
     lines = line.take(owner)
     halves, front = first_steps(pairing, lines, z[owner], p[owner], tangents)
-    seeds, met, _ = lead_out(pairing, halves, edge[owner[halves]], lines.take(halves), front)
-    count = pairing.points.count
-    pairing.points.over_vertices(*seeds)
-    index = pairing.setting.structure.index(z, p)
-    for half in np.unique(met.lanes[met.kinds == VertexKind.CAP]).tolist():
-        own, k = met.take(met.lanes == half), half // HALVES
-        if cap_at(pairing, new[k]) < 0 and VertexKind.CROSSING not in own.kinds:
-            start = pairing.points.add(z[k], p[k], int(index[k]), VertexKind.CAP, int(edge[k]))
-            rest = pairing.points.add_many(own.z, own.p, own.index, own.kinds, int(edge[k]))
-            pairing.arcs.setdefault(int(edge[k]), []).append((start, *rest.tolist()))
+    return lead_out(pairing, halves, edge[owner[halves]], lines.take(halves), front)
+
+
+def _add(pairing: Pairing, exit_: CapExit) -> int:
+    """Number of a new point on a constraint."""
+    index = pairing.setting.structure.index(exit_.z[None], exit_.p[None])
+    return pairing.points.add(exit_.z, exit_.p, int(index[0]), VertexKind.CAP, exit_.edge)
+
+
+def _end_at_constraint(pairing: Pairing, point: int, edge: int, cap: int) -> None:
+    """Let the curve from a point over a vertex end at a constraint, instead of one that passed it.
+
+    Behind it a violation is hidden, which neither end of the edge shows.
+    """
     pairing.fit()
-    for key, each in pairing.cap_exits.items():
-        if each is not None and cap_at(pairing, each) < 0:
-            pairing.cap_exits[key] = None
-    return pairing.points.count > count
+    known = pairing.ray(point, edge)
+    if known >= 0:
+        pairing.forget(known)
+    pairing.enter(point, edge, -1, [cap])
 
 
 def _enter_at_folds(pairing: Pairing, pairs: Sequence[tuple[int, int]]) -> bool:
@@ -127,13 +158,14 @@ def _enter(pairing: Pairing, edge: Items, z: Lanes, p: Parameters) -> bool:
     tangents = np.where(sense, -1.0, 1.0)[:, None] * phi[owner], np.zeros(len(owner))
     halves, front = first_steps(pairing, line, z[owner], p[owner], tangents)
     lines = line.take(halves)
-    seeds, met, turns = lead_out(pairing, halves, edge[owner[halves]], lines, front)
-    for half, t in turns.items():  # a vertex between both folds sees the ring
+    led = lead_out(pairing, halves, edge[owner[halves]], lines, front)
+    met = led.met
+    for half, t in led.rings.items():  # a vertex between both folds sees the ring
         k = int(owner[half])
         middle = _share(pairing, int(edge[k]), 0.5 * (p[k] + t))
         pairing.rings[int(edge[k])] = min(max(middle, NEAR_AN_END), 1.0 - NEAR_AN_END)
     count = store.count
-    store.over_vertices(*seeds)
+    store.over_vertices(*led.seeds)
     left = np.unique(met.lanes[met.kinds == VertexKind.CAP])
     left = np.setdiff1d(left, met.lanes[met.kinds == VertexKind.CROSSING])
     entered = np.unique(left[np.isin(left ^ 1, left)] // HALVES).tolist()
