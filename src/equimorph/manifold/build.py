@@ -228,7 +228,7 @@ def _complete(
     recovered = 0
     for number in range(SEARCHES):
         # what stays undecided in spite of bisection is not mended by more equilibria
-        if pairing.is_full or Outlook.is_dim(cells):
+        if pairing.is_full or lifting.given_up or Outlook.is_dim(cells):
             found = Check(0, eset.points[:0])
             break
         found = check(eset, generator, _checks(effort.checks, order.setting), order.progress)
@@ -254,13 +254,16 @@ class _Lifting:
     ) -> None:
         self.pairing, self.order, self.intervals, self.tiles = pairing, order, intervals, tiles
         self.finder, self.unseen = CellFinder(), UnseenFinder()
+        self.given_up = False
+        """Whether bisection ended because it did not help."""
 
     def upright(self) -> tuple[Cells, EquilibriumSet]:
         """Cells and set; grid cells below those of a wrong sense are bisected and lifted again."""
         self.pairing.fit()
         cells, eset = self._lift()
         for _ in range(MENDED):
-            if Outlook.is_dim(cells) or not _divide_wrong(self.pairing, eset):
+            dim = self.given_up or Outlook.is_dim(cells)
+            if dim or not _divide_wrong(self.pairing, eset):
                 break
             cells, eset = self._lift()
         return cells, eset
@@ -283,7 +286,8 @@ class _Lifting:
             cells = self._lift_cells(self.tiles if number == 0 else None)
             self._make_room()
             outlook = (outlook or Outlook.of(pairing, cells)).renewed(pairing, cells)
-            last = outlook.is_hopeless(pairing, cells) or number == rounds - 1
+            self.given_up = outlook.is_hopeless(pairing, cells)
+            last = self.given_up or number == rounds - 1
             if cells.doubtful == 0 or last:
                 cells = _look(pairing, cells, self.finder, unseen)
             if cells.doubtful == 0 or last:

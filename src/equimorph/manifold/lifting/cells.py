@@ -179,7 +179,7 @@ Close = Callable[[Pairing], tuple[Discs, Balls]]
 
 
 HOPELESS = 50
-"""Bisection may end once more cells are undecided."""
+"""Undecided cells from which on bisection may end before it has gone far."""
 MULTIPLIED = 4
 """Undecided cells, over what there were at first, beyond which bisection ends."""
 GROWN = 3
@@ -238,10 +238,10 @@ class Outlook:
 
         Along a line where the set is singular doubt only multiplies; elsewhere it vanishes.
         """
-        if pairing.is_full or not self.is_dim(cells):
-            return pairing.is_full
         grown = pairing.points.count > max(GROWN * self.points, CHEAP)
         persists = cells.doubtful >= self.doubtful and grown
+        if pairing.is_full or not self.is_dim(cells):
+            return pairing.is_full or (persists and self.doubtful > 0)
         multiplies = cells.doubtful > MULTIPLIED * self.doubtful
         return multiplies or persists or self.is_crowded(pairing, cells)
 
