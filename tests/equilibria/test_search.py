@@ -5,7 +5,8 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 import equimorph as em
-from equimorph.equilibria import distinct, settle
+from equimorph.equilibria import distinct, search_points, settle
+from equimorph.equilibria.random_search import Ground, Pools
 from equimorph.errors import InputError
 from oracles.polynomial import Polynomial, pitchfork_form
 
@@ -59,6 +60,35 @@ def test_mirror_images_are_states_too(arch):
     images = em.States(arch, z, p)
     assert (images.residual < 1e-9).all()
     assert len(distinct(arch, np.concatenate([found.z, z]))) == len(found)
+
+
+def test_a_search_beside_known_states_finds_the_others():
+    """E = Σ (x⁴/4 − x²/2) over two unknowns: nine states, whatever part of them is known."""
+    plane = Polynomial(
+        lambda x, y, a: (x**4 + y**4) * 0.25 - (x**2 + y**2) * 0.5 + a * 0.0, 2, ("a",)
+    )
+    every = em.find_equilibria(plane, {}, starts=200)
+    for some in ([], [0], [1, 4, 8], list(range(9))):
+        (found,) = search_points(plane, every.p[:1], starts=60, runs=1, known=every[some])
+        np.testing.assert_allclose(np.sort(found.energy), every.energy, atol=1e-12)
+        told = found.completeness
+        assert told.captured[0].sum() == len(some)
+        assert told.captured[1:].any(axis=0).all()  # what was known is met again
+    with pytest.raises(InputError, match="`known` must lie over the points"):
+        search_points(plane, every.p[:1] + 1.0, known=every)
+
+
+def test_known_states_to_which_nothing_leads_are_not_caught():
+    """Of three known states of E = x⁴/4 − x²/2 Newton's method leads to one, twice."""
+    plane = pitchfork_form(1.0)
+    z = np.zeros((3, plane.size))
+    z[:, 0] = [-1.0, 0.0, 1.0]
+    point = np.array([[1.0, 0.0]])
+    pools = Pools(Ground(plane, point, ()), np.random.default_rng(0), z, np.zeros(3, int))
+    assert len(pools.caught(0)) == 0
+    pools._take(np.repeat(z[2:], 2, axis=0) + 1e-12, np.zeros(2, int))
+    assert pools.caught(0)[:, 0] == pytest.approx([1.0])
+    assert len(pools.z) == 3
 
 
 def test_nothing_outside_the_constraints_is_returned(arch):

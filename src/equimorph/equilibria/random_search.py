@@ -94,7 +94,7 @@ class Pools:
 
     A group is one independent run at one point; all groups advance together in one batch. What the
     discretisation does not resolve is kept apart. starts, arrived: groups of the random guesses of
-    runs, and of those that led to a state, known or not.
+    runs, and of those that led to a state, known or not. led: where all that was tried led to.
     """
 
     def __init__(
@@ -111,6 +111,18 @@ class Pools:
         self.failures: list[tuple[str, Groups]] = []
         self.starts = self.arrived = np.zeros(0, int)
         self.unresolved: list[tuple[Lanes, Groups]] = []
+        self.led: list[tuple[Lanes, Groups]] = []
+        self._begun = len(self.z)
+
+    def caught(self, group: int) -> Lanes:
+        """States of a group but those known before to which nothing has led."""
+        own = np.flatnonzero(self.group == group)
+        known = own[own < self._begun]
+        met = np.concatenate([self.z[:0], *(z[of == group] for z, of in self.led)])
+        met = np.concatenate([met, *self.ground.images(met, group), self.z[known]])
+        some = len(met) - len(known)
+        apart = distinct(self.ground.structure, met, some)[some:] - some
+        return np.asarray(self.z[np.setdiff1d(own, known[apart])])
 
     def start(self, guesses: int) -> None:
         """Newton from random guesses, homotopy where it fails, deflation next to what was found."""
@@ -136,14 +148,19 @@ class Pools:
         for share in (NUDGE, 1.0):
             self._by_deflation(np.flatnonzero(np.isin(self.group, groups)), share)
 
-    def spread(self, begin: int = 0) -> None:
-        """Lay lines through equilibria, those before `begin` left out, until nothing is new."""
+    def spread(self, begin: int = 0, enough: int = 0) -> None:
+        """Lay lines through equilibria, those before `begin` left out, until nothing is new.
+
+        Up to three times the usual number through each, where a point has not `enough` otherwise.
+        """
         for _ in range(ROUNDS):
             new = np.arange(begin, len(self.z))
             begin = len(self.z)
             if len(new) == 0:
                 return
-            self.lay_lines(np.repeat(new, LINES))
+            group = self.group[new]
+            states = np.bincount(self.group)[group]
+            self.lay_lines(np.repeat(new, np.clip(enough // states, LINES, 3 * LINES)))
 
     def push(self, begin: int = 0) -> None:
         """Push equilibria, those before `begin` left out, both ways by random forces through folds.
@@ -296,6 +313,7 @@ class Pools:
         z, group = self.ground.pick(z[good], group[good]), group[good]
         # a little outside, states still serve as stepping stones
         z, group = (part[self.ground.excess(z, group) < 1.0] for part in (z, group))
+        self.led.append((z, group))
         for each in np.unique(group):
             mine, known = z[group == each], self.z[self.group == each]
             pool = np.concatenate([known, mine[distinct(structure, mine)]])

@@ -10,12 +10,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
-from equimorph.arrays import Bool, Float, Int
+from equimorph.arrays import Bool, Float, Int, Lanes, Numbers
 from equimorph.equilibria.capture import Completeness
 from equimorph.equilibria.gradient_flow import QUICK, Pace
 from equimorph.equilibria.legs import check_isolated
 from equimorph.equilibria.minima_graph import Argument, MinimaGraph, arguments_of, contradicts
 from equimorph.equilibria.random_search import BEYOND, UNRESOLVED, Ground, Pools, distinct
+from equimorph.errors import InputError
 from equimorph.model import Constraint, parameter_vector
 from equimorph.structures import States, Structure
 from equimorph.structures.metric import metric_length
@@ -28,6 +29,9 @@ NO_RUN = -1
 """Instead of the number of a run: found by descents, or between minima."""
 BETWEEN = 100
 """Guesses between known states, over each point in each of these rounds."""
+ENOUGH = 180
+"""Lines through known states over a point, from which on each state has the usual number of them:
+where none of so many finds another one, fewer than 2 % of such lines do (at 95 % confidence)."""
 REPEATS = 3
 """Times that the runs at a point are made, at most: again while an equilibrium was found once."""
 
@@ -122,6 +126,7 @@ def search_points(
     starts: int = 200,
     runs: int = 3,
     seed: int = 0,
+    known: States | None = None,
 ) -> list[FoundStates]:
     """`find_equilibria` at many points of the parameter space together, in less time.
 
@@ -129,13 +134,22 @@ def search_points(
     ----------
     points
         All parameters of the structure, one point per row.
+    known
+        Equilibria over these points. They count as the first run, and lines begin at them in the
+        others, too: runs need not find all of them before they meet what is missing.
 
     Raises
     ------
     InputError
-        For less than one start or run.
+        For less than one start or run, or known states that lie over none of the points.
     """
-    return search_with_graph(structure, points, within, starts, runs, seed)[0]
+    if known is not None:
+        over = (known.p[:, None] == points).all(axis=2).any(axis=1)
+        if not over.all():
+            raise InputError(
+                f"`known` must lie over the points that are searched; {np.sum(~over)} do not."
+            )
+    return search_with_graph(structure, points, within, starts, runs, seed, known=known)[0]
 
 
 def search_with_graph(
@@ -146,6 +160,7 @@ def search_with_graph(
     runs: int,
     seed: int,
     pace: Pace = QUICK,
+    known: States | None = None,
 ) -> tuple[list[FoundStates], MinimaGraph]:
     """What `search_points` finds, and the graph of all states that served it.
 
@@ -154,13 +169,13 @@ def search_with_graph(
     if not structure.finds_orbits:
         check_isolated(structure, points)
     generator, guesses = np.random.default_rng(seed), -(-starts // runs)
-    catches = [_Catch.empty(structure, point, tuple(within)) for point in points]
+    catches = [_Catch.before(structure, point, tuple(within), known) for point in points]
     todo = np.arange(len(points))
     for _ in range(REPEATS):
         ground = Ground(structure, np.repeat(points[todo], runs, axis=0), tuple(within))
-        pools = Pools(ground, generator)
+        pools = Pools(ground, generator, *_begun([catches[point] for point in todo], runs))
         pools.start(guesses)
-        pools.spread()
+        pools.spread(enough=ENOUGH if known is not None else 0)
         for number, point in enumerate(todo):
             catches[point] = catches[point].with_runs(pools, number * runs, runs)
         todo = np.array([point for point in todo if catches[point].doubtful], dtype=int)
@@ -168,6 +183,13 @@ def search_with_graph(
             break
     ground = Ground(structure, points, tuple(within))
     return _complete_by_arguments(ground, catches, generator, pace)
+
+
+def _begun(catches: list["_Catch"], runs: int) -> tuple[Lanes, Numbers]:
+    """States with which runs begin, and the runs."""
+    none = np.zeros((0, catches[0].z.shape[1]))
+    known = [none if each.known is None else each.known for each in catches for _ in range(runs)]
+    return np.concatenate(known), np.arange(len(known)).repeat([len(each) for each in known])
 
 
 def _complete_by_arguments(
@@ -212,31 +234,36 @@ class _Catch:
     runs: int
     failures: Mapping[str, int]
     unresolved: Float[np.ndarray, "dropped size"]
+    known: Float[np.ndarray, "known size"] | None
     starts: int = 0
     arrived: int = 0
 
     @classmethod
-    def empty(
+    def before(
         cls,
         structure: Structure,
         point: Float[np.ndarray, " parameters"],
         within: tuple[Constraint, ...],
+        known: States | None,
     ) -> "_Catch":
-        """Before the first run."""
+        """Before the first run, or with states that are known as that."""
         ground = Ground(structure, point[None], within)
         none = np.zeros((0, structure.size))
-        return cls(ground, none, np.zeros(0, int), 0, {}, none)
+        if known is None:
+            return cls(ground, none, np.zeros(0, int), 0, {}, none, None)
+        z = known.z[(known.p == point).all(axis=1)]
+        return cls(ground, z, np.zeros(len(z), int), 1, {}, none, z)
 
     def with_runs(self, pools: Pools, first: int, runs: int) -> "_Catch":
         """With the groups `first`, `first` + 1, ... of pools as further runs."""
-        mine = np.flatnonzero((pools.group >= first) & (pools.group < first + runs))
-        z, run = pools.z[mine], pools.group[mine] - first + self.runs
+        z = [pools.caught(first + number) for number in range(runs)]
+        run = np.repeat(np.arange(runs), [len(each) for each in z]) + self.runs
         counts = Counter(self.failures)
         for reason, group in pools.failures:
             counts[reason] += int(((group >= first) & (group < first + runs)).sum())
         return _Catch(
             self.ground,
-            np.concatenate([self.z, z]),
+            np.concatenate([self.z, *z]),
             np.concatenate([self.run, run]),
             self.runs + runs,
             {reason: count for reason, count in counts.items() if count},
@@ -247,6 +274,7 @@ class _Catch:
                     for each, group in pools.unresolved
                 ]
             ),
+            self.known,
             self.starts + int(((pools.starts >= first) & (pools.starts < first + runs)).sum()),
             self.arrived + int(((pools.arrived >= first) & (pools.arrived < first + runs)).sum()),
         )
@@ -282,8 +310,14 @@ class _Catch:
 
     @property
     def doubtful(self) -> bool:
-        """Whether a state was found only once in several runs: another one may be missing."""
-        return self.runs > 1 and bool((self.captured.sum(axis=0) == 1).any())
+        """Whether a state was found only once in several runs: another one may be missing.
+
+        Where some were known, those count alone: the others are what was sought.
+        """
+        captured = self.captured
+        if self.known is not None:
+            captured = captured[:, captured[0]]
+        return self.runs > 1 and bool((captured.sum(axis=0) == 1).any())
 
     def states(self, arguments: tuple[Argument, ...]) -> FoundStates:
         """Return the result."""

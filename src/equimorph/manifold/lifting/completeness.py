@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from equimorph.arrays import Float, Int, Lanes, Places
-from equimorph.equilibria import search_points
+from equimorph.equilibria import Completeness, search_points
 from equimorph.equilibria.random_search import Ground, Pools
 from equimorph.equilibria.settle import Guards, free_directions, settle
 from equimorph.manifold.complex.base_mesh import BaseMesh
@@ -107,13 +107,16 @@ def check(
 
 
 def _searched(eset: EquilibriumSet, places: list[dict[str, float]], seed: int) -> Check:
-    """What searches find at some points."""
+    """What searches find at some points, beside what the set has there."""
+    points = np.stack([eset.parameters_at(at) for at in places])
     searched = search_points(
         eset.structure,
-        np.stack([eset.parameters_at(at) for at in places]),
+        points,
         within=eset.constraints,
         starts=STARTS,
+        runs=1,
         seed=seed,
+        known=eset.sheets.over(points)[0],
     )
     found = join_states(eset.structure, searched)
     dropped = [each.unresolved for each in searched if each.unresolved is not None]
@@ -122,7 +125,8 @@ def _searched(eset: EquilibriumSet, places: list[dict[str, float]], seed: int) -
     )
     left_out = len(_left_out(eset, join_states(eset.structure, dropped)))
     lacking = _lacking(found, eset)
-    return Check(len(found), lacking, left_out=left_out, starts=starts, arrived=arrived)
+    met = sum(_met(each.completeness) for each in searched)
+    return Check(met, lacking, left_out=left_out, starts=starts, arrived=arrived)
 
 
 def _elsewhere(eset: EquilibriumSet, seed: int) -> Check:
@@ -152,6 +156,11 @@ def _left_out(eset: EquilibriumSet, dropped: States) -> States:
     good = eset.structure.may_resolve(dropped.z, dropped.p)
     good &= are_feasible(eset.constraints, dropped.z, dropped.p)
     return _lacking(dropped[np.flatnonzero(good)], eset)
+
+
+def _met(told: Completeness) -> int:
+    """Number of states that were found without being known."""
+    return int((~told.captured[0] | told.captured[1:].any(axis=0)).sum())
 
 
 def _in_sides(eset: EquilibriumSet, generator: np.random.Generator) -> tuple[States, Places]:
