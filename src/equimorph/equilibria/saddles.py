@@ -143,7 +143,7 @@ def states_between(structure: Structure, pairs: Pairs) -> Met:
     owner, leg = np.tile(np.arange(count), LEGS), np.arange(LEGS).repeat(count)
     force = np.where(leg % 2, -1.0, 1.0)[:, None] * push[owner]
     line = growing_force(structure, ways.p[owner], force, distance[owner])
-    met, lanes = [np.zeros((0, structure.size))], [np.zeros(0, int)]
+    met = [(np.zeros(0, int), np.zeros((0, structure.size)))]  # lanes, and where they returned
 
     def follow(
         ended: Numbers, code: Numbers, z: Lanes
@@ -151,17 +151,16 @@ def states_between(structure: Structure, pairs: Pairs) -> Met:
         back = code == EventCode.RETURNED
         exact = settle(structure, z[back], ways.p[owner[ended[back]]], guards=NEAR)
         good, z = ended[back][exact.found], exact.z[exact.found]
-        met.append(z)
-        lanes.append(good)
+        met.append((good, z))
         more = good < (LEGS - 1) * count
         return good[more] + count, z[more]
 
     starts = np.tile(ways.start, (LEGS, 1))
     options = steps_for(float(distance.min()))
     trace(line, starts, (), options, onwards=Onwards(count, follow))
-    lane = np.concatenate(lanes)
+    lane, z = (np.concatenate(each) for each in zip(*met, strict=True))
     order = np.argsort(lane)
-    return Met(np.concatenate(met)[order], owner[lane[order]] % len(pairs.p))
+    return Met(z[order], owner[lane[order]] % len(pairs.p))
 
 
 def _pushes(structure: Structure, pairs: Pairs) -> Lanes:
