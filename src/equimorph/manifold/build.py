@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
-from equimorph.arrays import Items, Place
+from equimorph.arrays import Place
 from equimorph.manifold.complex.description import Frame, wrong_cells
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet, with_audit
 from equimorph.manifold.complex.kept_sets import Effort, question_of_set, recall_set
@@ -228,7 +228,7 @@ def _complete(
     recovered = 0
     for number in range(SEARCHES):
         # what stays undecided in spite of bisection is not mended by more equilibria
-        if pairing.is_full or lifting.given_up or Outlook.is_dim(cells):
+        if pairing.is_full or lifting.given_up:
             found = Check(0, eset.points[:0])
             break
         found = check(eset, generator, _checks(effort.checks, order.setting), order.progress)
@@ -254,16 +254,14 @@ class _Lifting:
     ) -> None:
         self.pairing, self.order, self.intervals, self.tiles = pairing, order, intervals, tiles
         self.finder, self.unseen = CellFinder(), UnseenFinder()
-        self.given_up = False
-        """Whether bisection ended because it did not help."""
+        self.given_up = False  # whether bisection did not help, or much is undecided
 
     def upright(self) -> tuple[Cells, EquilibriumSet]:
         """Cells and set; grid cells below those of a wrong sense are bisected and lifted again."""
         self.pairing.fit()
         cells, eset = self._lift()
         for _ in range(MENDED):
-            dim = self.given_up or Outlook.is_dim(cells)
-            if dim or not _divide_wrong(self.pairing, eset):
+            if self.given_up or not _divide_wrong(self.pairing, eset):
                 break
             cells, eset = self._lift()
         return cells, eset
@@ -293,13 +291,14 @@ class _Lifting:
             if cells.doubtful == 0 or last:
                 break
             bisected += cells.doubtful
-            chosen, exits = _longest_edges(pairing, cells), unseen.exits | ring_middles(pairing)
+            chosen, exits = cells.longest_edges(pairing.mesh), unseen.exits | ring_middles(pairing)
             exits |= strips_astray(pairing, cells.astray)
             used = pairing.mesh.edges_in_use  # the last look may be some rounds ago
             exits = {edge: share for edge, share in exits.items() if used[edge]}
             # first those through which tongues and strips leave their cells
             chosen = np.concatenate([np.array(list(exits), int), np.setdiff1d(chosen, list(exits))])
             pairing.use_mesh(bisect(pairing.mesh, chosen, exits))
+        self.given_up |= Outlook.is_dim(cells)
         return cells, bisected
 
     def _make_room(self) -> None:
@@ -393,11 +392,3 @@ def _spread(pairing: Pairing, lines: Lines, seed: int, progress: Progress) -> Se
     vertex = store.vertex[: store.count]
     found = np.flatnonzero((vertex >= 0) & (number[vertex] >= 0))
     return number[vertex[found]], store.z[found], store.p[found], store.index[found]
-
-
-def _longest_edges(pairing: Pairing, cells: Cells) -> Items:
-    """Longest edge of each doubtful grid cell, relative to the box."""
-    mesh = pairing.mesh
-    around = mesh.faces[cells.doubtful_tetrahedra]
-    groups = mesh.sides[cells.doubtful_triangles], mesh.sides[around].reshape(len(around), 12)
-    return np.unique(np.concatenate([longest_edges(mesh, sides) for sides in groups]))

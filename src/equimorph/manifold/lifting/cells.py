@@ -7,6 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 from equimorph.arrays import Bool, CellNumbers, Facets, Float, Int, Items, Pairs
+from equimorph.manifold.complex.base_mesh import BaseMesh
 from equimorph.manifold.complex.description import Complex, Frame, Lifting, describe
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.manifold.geometry.points import VertexKind
@@ -15,6 +16,7 @@ from equimorph.manifold.lifting.balls import Balls, fill
 from equimorph.manifold.lifting.crossing_branches import lonely
 from equimorph.manifold.lifting.discs import Discs, assemble, sides_among, sides_of
 from equimorph.manifold.lifting.edges import EFFORTS
+from equimorph.manifold.lifting.grid import longest_edges
 from equimorph.manifold.lifting.loops import find_loops
 from equimorph.manifold.lifting.pairing import Pairing, abandoned_rays
 from equimorph.structures import States
@@ -173,6 +175,12 @@ class Cells:
     def doubtful(self) -> int:
         """Number of grid cells in doubt."""
         return len(self.doubtful_triangles) + len(self.doubtful_tetrahedra)
+
+    def longest_edges(self, mesh: BaseMesh) -> Items:
+        """Longest edge of each doubtful grid cell, relative to the box."""
+        around = mesh.faces[self.doubtful_tetrahedra]
+        groups = mesh.sides[self.doubtful_triangles], mesh.sides[around].reshape(len(around), 12)
+        return np.unique(np.concatenate([longest_edges(mesh, sides) for sides in groups]))
 
 
 Close = Callable[[Pairing], tuple[Discs, Balls]]

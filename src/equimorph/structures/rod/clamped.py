@@ -239,16 +239,8 @@ class ClampedMechanics(PlanarMechanics):
         self, force: Force, z: Lanes, p: Parameters, row: Lanes, corner: Values, defect: Values
     ) -> Advance:
         """One fused kernel; lanes with an unsafe pivot take the general solve."""
-        z, p = self.check_widths((z, p))
-        given = z, p, np.zeros_like(p), row, corner, defect, *force
-        out, ratio = self.fused_step(advance_under_lanes, self._step_data, *given)
-        unsafe = (~(ratio >= PIVOT_GUARD)).nonzero()[0]
-        if len(unsafe):
-            some = (each[unsafe] for each in (z, p, row, corner, defect))
-            again = super().advance_under((force[0][unsafe], force[1][unsafe]), *some)
-            for name, column in vars(again).items():
-                getattr(out, name)[unsafe] = column
-        return out
+        given = z, p, row, corner, defect
+        return self.fused_advance_under(advance_under_lanes, self._step_data, force, *given)
 
     def correction(self, z: Lanes, p: Parameters) -> Advance:
         """The fused kernel, whose steps are exact enough down to smaller pivots."""

@@ -6,14 +6,14 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from equimorph.arrays import Flags, Float, Lanes, Nodal, Parameters, Values, Velocity
+from equimorph.arrays import Flags, Float, Lanes, Nodal, Parameters, Some, Values, Velocity
 from equimorph.errors import InputError
 from equimorph.linalg.condensed import PIVOT_GUARD
 from equimorph.linalg.intervals import Interval
 from equimorph.linalg.kernels import largest_products
 from equimorph.linalg.lanes import over_lanes
 from equimorph.structures.contract import CompiledSteps, Symmetry
-from equimorph.structures.equations import Advance, Direction, Enclosed, Equations
+from equimorph.structures.equations import Advance, Direction, Enclosed, Equations, Force
 from equimorph.structures.material_points import MaterialPoints
 from equimorph.structures.rod.discretisation import Mesh, error_by_refinement
 from equimorph.structures.rod.planar_energy import PlanarEnergy
@@ -114,6 +114,31 @@ class RodMechanics(Equations):
         given = z, p, dp, row, corner, defect
         return self.pivot_steps(*self.fused_step(kernel, shared, *given, *more), *given)
 
+    def fused_advance_under(  # a kernel, its tables, and what `advance_under` takes
+        self,
+        kernel: Callable[..., None],
+        shared: tuple[object, ...],
+        force: Force,
+        z: Lanes,
+        p: Parameters,
+        row: Lanes,
+        corner: Values,
+        defect: Values,
+        *more: np.ndarray,
+    ) -> Advance:
+        """`advance_under` by one kernel; lanes with an unsafe pivot take the general solve.
+
+        The kernel takes the force last, after `more`.
+        """
+        z, p = self.check_widths((z, p))
+        given, none = (z, p, row, corner, defect), np.zeros_like(p)
+        step = self.fused_step(kernel, shared, z, p, none, row, corner, defect, *more, *force)
+        general = super().advance_under
+        return _with_unsafe(
+            *step, PIVOT_GUARD,
+            lambda some: general((force[0][some], force[1][some]), *(x[some] for x in given)),
+        )  # fmt: skip
+
     def fused_step(
         self, kernel: Callable[..., None], shared: tuple[object, ...], z: Lanes, *more: np.ndarray
     ) -> tuple[Advance, Values]:
@@ -133,12 +158,19 @@ class RodMechanics(Equations):
         self, out: Advance, ratio: Values, *given: np.ndarray, guard: float = PIVOT_GUARD
     ) -> Advance:
         """Steps, those with an unsafe pivot by the general solve."""
-        if not ratio.min(initial=1.0) >= guard:
-            unsafe = ~(ratio >= guard)
-            again = super().advance(*(x[unsafe] for x in given))
-            for name, column in vars(again).items():
-                getattr(out, name)[unsafe] = column
-        return out
+        general = super().advance
+        return _with_unsafe(out, ratio, guard, lambda some: general(*(x[some] for x in given)))
+
+
+def _with_unsafe(
+    out: Advance, ratio: Values, guard: float, general: Callable[[Some], Advance]
+) -> Advance:
+    """Steps, those whose ratio of pivots is below a guard by the general solve."""
+    if not ratio.min(initial=1.0) >= guard:
+        unsafe = np.flatnonzero(~(ratio >= guard))
+        for name, column in vars(general(unsafe)).items():
+            getattr(out, name)[unsafe] = column
+    return out
 
 
 class PlanarMechanics(RodMechanics):
