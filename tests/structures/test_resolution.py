@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from equimorph import Box, Frame, Rod, SpatialRod, equilibrium_set
+from equimorph import Box, Rod, SpatialRod, equilibrium_set
 from equimorph.structures.resolution import TAIL, turn_of_element
 from equimorph.structures.rod.discretisation import reference_element
 from equimorph.structures.spatial.lagrangian import LARGEST_TAIL
@@ -71,22 +71,3 @@ def test_a_set_lacks_no_states_with_elements_for_its_bound():
         left_out.append(eset.audit.left_out)
     assert left_out[0] > 0
     assert left_out[1] == 0
-
-
-def test_states_that_differ_by_whole_turns_are_one():
-    """A strut between hinges turned by 2π is in equilibrium as before; a set does not lack it."""
-    frame = Frame(
-        {"A": (0, 0), "B": (0, 1), "C": (1, 1)},
-        [("A", "B"), {"ends": ("B", "C"), "hinges": ["B", "C"]}],
-        {"A": "fixed", "C": "xy"},
-        {"P": {"B": (0.0, -1.0)}},
-    )
-    state = frame.natural_state()
-    turned = state.z[None].copy()
-    places = frame.model.place[frame.model.piece_nodes[1]]
-    turned[:, places[places >= 0]] += 2.0 * np.pi
-    p = state.p[None]
-    assert np.abs(frame.residual(turned, p)).max() < 1e-12
-    both = np.concatenate([state.z[None], turned]), np.repeat(p, 2, axis=0)
-    np.testing.assert_array_equal(frame.resolved(*both), [True, False])
-    np.testing.assert_array_equal(frame.may_resolve(*both), [True, False])

@@ -19,6 +19,7 @@ from equimorph.model import Constraint, worst_relative_excess
 from equimorph.structures import Structure
 from equimorph.structures.contract import Symmetry
 from equimorph.structures.metric import metric_coordinates
+from equimorph.structures.whole_turns import taken_back
 from equimorph.tolerances import SAME_STATE
 
 Groups = Numbers
@@ -84,9 +85,9 @@ class Ground:
         return [self.pick(each.apply(z, p)[0], same) for each in self.symmetries(group)]
 
     def pick(self, z: Lanes, group: Groups) -> Lanes:
-        """One state of each orbit on which there are some."""
+        """One state of each orbit on which there are some, and of those whole turns away."""
         p = self.p[group]
-        return self.structure.pick_on_orbits(z, p, p)
+        return self.structure.pick_on_orbits(taken_back(self.structure, z), p, p)
 
 
 class Pools:

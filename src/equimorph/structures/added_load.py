@@ -183,6 +183,11 @@ class Pushed(Structure):
         """Whether finer discretisations of the structure may resolve states."""
         return self._base.may_resolve(z, self._own(p))
 
+    @property
+    def whole_turns(self) -> Float[np.ndarray, "turns size"]:
+        """Whole turns of the structure."""
+        return self._base.whole_turns
+
     def shape(
         self, z: Lanes, p: Parameters, s: Float[np.ndarray, " points"] | None = None
     ) -> Float[np.ndarray, "lanes points space"]:

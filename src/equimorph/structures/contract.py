@@ -239,6 +239,14 @@ class Structure(Rebuilt, Inertial):
         return z
 
     @property
+    def whole_turns(self) -> Float[np.ndarray, "turns size"]:
+        """Changes of z after which a state is the same: whole turns of what nothing keeps from it.
+
+        None by default. Searches take back what they can; see `whole_turns.taken_back`.
+        """
+        return np.zeros((0, self.size))
+
+    @property
     def validity(self) -> tuple[Constraint, ...]:
         """Constraints beyond which the energy does not describe the structure; none by default.
 

@@ -362,8 +362,8 @@ class FrameMechanics(DiscreteStructure):
         return np.concatenate([nodes[:, model.place >= 0], forces], axis=1)
 
     @cached_property
-    def _turning(self) -> Int[np.ndarray, " parts"]:
-        """A node of each rigidly joined part whose turn nothing holds."""
+    def whole_turns(self) -> Float[np.ndarray, "turns size"]:
+        """Turns by 2π of each rigidly joined part whose turn nothing holds."""
         model = self.model
         part = np.arange(len(model.place))
         for _ in part:
@@ -373,23 +373,13 @@ class FrameMechanics(DiscreteStructure):
             if np.array_equal(part, before):
                 break
         held = np.unique(part[(model.place < 0) | (model.springs > 0.0)])
-        return np.setdiff1d(part, held)
+        free = np.setdiff1d(part, held)
+        turns = np.zeros((len(free), self.size))
+        turns[:, : self.unknowns] = 2.0 * np.pi * (part[model.place >= 0] == free[:, None])
+        return turns
 
     def resolved(self, z: Lanes, p: Parameters) -> Flags:
-        """Whether the highest Legendre coefficients of ψ are small in every element.
-
-        Of states that are the same but for whole turns, those that turn least; see `may_resolve`.
-        """
+        """Whether the highest Legendre coefficients of ψ are small in every element."""
         psi = self.turns(z, self.scalars(z, p))
         tail = np.abs(psi[:, self.model.nodes] @ self.model.mesh.reference.to_legendre[-2:].T)
-        return np.asarray((tail.max(axis=(1, 2)) < RESOLVED) & self._turn_least(psi))
-
-    def may_resolve(self, z: Lanes, p: Parameters) -> Flags:
-        """Whether parts that nothing keeps from turning have turned by half a turn at most.
-
-        They are the same after a whole turn: others are no states that a set lacks.
-        """
-        return self._turn_least(self.turns(z, self.scalars(z, p)))
-
-    def _turn_least(self, psi: Float[np.ndarray, "lanes nodes"]) -> Flags:
-        return np.asarray(np.abs(psi[:, self._turning]).max(axis=1, initial=0.0) <= np.pi)
+        return np.asarray(tail.max(axis=(1, 2)) < RESOLVED)

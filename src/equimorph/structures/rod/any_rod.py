@@ -172,6 +172,11 @@ class AnyRod(HeavyRod, Refinable):
         """Newton's method of the mechanics, if it is compiled."""
         return self.mechanics.compiled_newton
 
+    @property
+    def whole_turns(self) -> Float[np.ndarray, "turns size"]:
+        """Whole turns of a rod whose ends may turn."""
+        return self.mechanics.whole_turns
+
     def symmetries(self) -> tuple[Symmetry, ...]:
         """Mirror images and half turns of equilibria that are equilibria."""
         return self._symmetries

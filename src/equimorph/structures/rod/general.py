@@ -123,6 +123,13 @@ class GeneralMechanics(GeneralInertia):
             good[doubtful] = gap < LARGEST_GAP
         return np.asarray(good)
 
+    @cached_property
+    def whole_turns(self) -> Float[np.ndarray, "turns size"]:
+        """A turn by 2π if the angles of both ends are free."""
+        turn = np.zeros((1, self.size))
+        turn[:, : self.unknowns] = 2.0 * np.pi
+        return turn[: not (any(self.model.held) or self.model.springs.any())]
+
     @property
     def is_extensible(self) -> bool:
         """Whether the axis stretches."""

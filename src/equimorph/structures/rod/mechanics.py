@@ -85,6 +85,11 @@ class RodMechanics(Equations):
         """Elastic shortenings of the axis at the nodes of every element; 0 if inextensible."""
         return np.zeros((len(z), 1))
 
+    @property
+    def whole_turns(self) -> Float[np.ndarray, "turns size"]:
+        """Changes of z after which a state is the same; none by default."""
+        return np.zeros((0, self.size))
+
     @abstractmethod
     def resolved(self, z: Lanes, p: Parameters) -> Flags:
         """Whether the highest Legendre coefficients of the rotations are small in every element."""

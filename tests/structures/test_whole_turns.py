@@ -1,0 +1,100 @@
+"""States that are the same but for whole turns of what nothing holds are one to searches."""
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+from scipy.special import ellipe, ellipk
+
+from equimorph import Box, End, Frame, LineLoad, Rod, equilibrium_set, find_equilibria
+from equimorph.structures.whole_turns import taken_back
+from oracles import spatial_frames
+
+
+def strut() -> Frame:
+    """A column, and a member hinged at both of its ends."""
+    return Frame(
+        {"A": (0, 0), "B": (0, 1), "C": (1, 1)},
+        [("A", "B"), {"ends": ("B", "C"), "hinges": ["B", "C"]}],
+        {"A": "fixed", "C": "xy"},
+        {"P": {"B": (0.0, -1.0)}},
+    )
+
+
+TURNING = {
+    "strut": (strut, 1),
+    "hinges in space": (spatial_frames.shed, 2),
+    "pinned rod": (lambda: Rod(ends=("pinned", "pinned"), loads={"q": LineLoad()}), 1),
+    "rolling rod": (lambda: Rod(ends=("pinned", End("free", "free", "held"))), 1),
+    "sprung rod": (lambda: Rod(ends=(End(2.0, "held", "held"), "pinned")), 0),
+    "clamped rod": (Rod, 0),
+}
+
+
+@pytest.mark.parametrize("name", TURNING)
+def test_copies_balance_like_states_and_are_taken_back(name):
+    made, count = TURNING[name]
+    structure = made()
+    turns = structure.whole_turns
+    assert turns.shape == (count, structure.size)
+    p = np.tile([0.3 if each.default is None else each.default for each in structure.parameters],
+                (8, 1))  # fmt: skip
+    z = structure.sample(p, np.random.default_rng(0))
+    before, back = structure.residual(z, p), taken_back(structure, z)
+    for turn in (*(3.0 * turns), *-turns):
+        change = np.abs(structure.residual(z + turn, p) - before).max()
+        assert change < 1e-11 * np.abs(before).max()
+        np.testing.assert_allclose(taken_back(structure, z + turn), back, atol=1e-12)
+    share = back @ turns.T / (turns**2).sum(axis=1)
+    assert (np.abs(share) < 0.54).all()
+
+
+def elastica(span: float) -> float:
+    """Modulus of the inflectional elastica whose ends are so far apart, of length 1.
+
+    One half wave: 2E(k)/K(k) − 1 is the distance, 4kK(k) the largest curvature; n half waves have
+    n times this curvature, and index n − 1 between pins (Love, section 263).
+    """
+    return brentq(lambda m: 2.0 * ellipe(m) / ellipk(m) - 1.0 - span, 1e-9, 0.999)
+
+
+def test_a_rod_between_pins_has_two_states_of_each_number_of_waves():
+    """It was told to have 24 states, three of each, and six of them stable."""
+    m = elastica(0.8)
+    curvature = 4.0 * np.sqrt(m) * ellipk(m)
+    rod = Rod(ends=("pinned", "pinned"))
+    found = find_equilibria(rod, {"nu": 0.8}, within=[rod.max_curvature <= 14.0])
+    assert 4.0 * curvature < 14.0 < 5.0 * curvature
+    order = np.argsort(rod.max_curvature(found))
+    np.testing.assert_array_equal(found.index[order], np.repeat(np.arange(4), 2))
+    waves = np.repeat(np.arange(1, 5), 2) * curvature
+    np.testing.assert_allclose(rod.max_curvature(found)[order], waves, rtol=1e-6)
+    assert [str(each.standing) for each in found.arguments[:2]] == ["holds", "holds"]
+
+
+def test_a_set_of_a_rod_between_pins_has_no_copies():
+    rod = Rod(ends=("pinned", "pinned"))
+    eset = equilibrium_set(
+        rod, Box(nu=(0.75, 0.85)), within=[rod.max_curvature <= 10.0], intervals=(2,)
+    )
+    assert eset.audit.clean
+    # curvatures of three half waves lie within the bound at .85, of two at .75
+    over = [eset.over(nu=[span]).states for span in (0.751, 0.849)]
+    assert [sorted(each.index.tolist()) for each in over] == [
+        np.repeat(np.arange(int(10.0 // (4.0 * np.sqrt(m) * ellipk(m)))), 2).tolist()
+        for m in map(elastica, (0.751, 0.849))
+    ]
+
+
+@pytest.mark.slow
+def test_a_set_of_a_frame_with_a_hinge_is_no_lattice_of_copies():
+    """Searches met ever more turns of the hinge: it was refused as a set without end."""
+    frame = spatial_frames.shed(elements=2, degree=6)
+    eset = equilibrium_set(
+        frame,
+        Box(a=(-0.1497, 0.1097)),
+        fixed={"b": -0.1666, "P": -0.0477, "q": 0.0},
+        within=[frame.max_curvature <= 1.86],
+        intervals=(26,),
+    )
+    assert eset.audit.clean
+    assert len(eset.points) == 27
