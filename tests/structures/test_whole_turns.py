@@ -85,6 +85,22 @@ def test_a_set_of_a_rod_between_pins_has_no_copies():
     ]
 
 
+def test_a_set_has_one_copy_of_sheets_that_pass_half_a_turn():
+    """The line between the pins turns past π: what searches find on both sides is one sheet."""
+    rod = Rod(ends=("pinned", "pinned"))
+    eset = equilibrium_set(
+        rod,
+        Box(rise=(-0.3, 0.3)),
+        fixed={"nu": -0.4},
+        within=[rod.max_curvature <= 7.0],
+        intervals=(6,),
+    )
+    assert eset.audit.clean
+    m = elastica(0.5)
+    assert 4.0 * np.sqrt(m) * ellipk(m) < 7.0
+    assert eset.over(rise=[-0.3, 0.0, 0.3]).states.index.tolist() == [0] * 6
+
+
 @pytest.mark.slow
 def test_a_set_of_a_frame_with_a_hinge_is_no_lattice_of_copies():
     """Searches met ever more turns of the hinge: it was refused as a set without end."""

@@ -14,6 +14,7 @@ from equimorph.manifold.complex.kept_sets import Effort, question_of_set, recall
 from equimorph.manifold.geometry.setting import Setting
 from equimorph.manifold.lifting.cells import CellFinder, Cells, Outlook, account
 from equimorph.manifold.lifting.completeness import Check, check, recover
+from equimorph.manifold.lifting.copies import without_copies
 from equimorph.manifold.lifting.crossing_branches import flood_crossings, ring_middles
 from equimorph.manifold.lifting.flood import flood
 from equimorph.manifold.lifting.grid import (
@@ -388,7 +389,7 @@ def _spread(pairing: Pairing, lines: Lines, seed: int, progress: Progress) -> Se
     coarse = start_pairing(setting, mesh, pairing.limit)
     coarse.points.over_vertices(*seeds(setting, mesh, np.flatnonzero(number >= 0), seed))
     flood(coarse, progress)
-    store = coarse.points
-    vertex = store.vertex[: store.count]
-    found = np.flatnonzero((vertex >= 0) & (number[vertex] >= 0))
-    return number[vertex[found]], store.z[found], store.p[found], store.index[found]
+    store, found = coarse.points, without_copies(coarse)
+    fine = number[store.vertex[found]]
+    found, fine = found[fine >= 0], fine[fine >= 0]
+    return fine, store.z[found], store.p[found], store.index[found]

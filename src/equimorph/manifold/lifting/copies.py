@@ -1,0 +1,39 @@
+"""Pieces of a lift that are others, whole turns away: the set has one of them.
+
+Searches take whole turns back, each at its own point: where half a turn is passed between two
+points, the states found at one and at the other are on different copies of a piece.
+"""
+
+from itertools import combinations
+
+import numpy as np
+
+from equimorph.arrays import Items
+from equimorph.linalg.graphs import components
+from equimorph.manifold.lifting.pairing import Pairing
+from equimorph.structures.metric import metric_length
+from equimorph.structures.whole_turns import taken_back
+from equimorph.tolerances import SAME_STATE
+
+
+def without_copies(pairing: Pairing) -> Items:
+    """Known points over vertices, but of all pieces that are copies those of the largest alone."""
+    store, structure = pairing.points, pairing.setting.structure
+    vertex = store.vertex[: store.count]
+    over = np.flatnonzero(vertex >= 0)
+    if len(structure.whole_turns) == 0:
+        return over
+    lifted = pairing.curves.end >= 0
+    ends = np.stack([pairing.curves.start, pairing.curves.end], axis=1)[lifted]
+    piece = components(store.count, ends)
+    least = taken_back(structure, store.z[: store.count])
+    pairs = np.array(
+        [pair for each in np.unique(vertex[over]) for pair in combinations(store.over(each), 2)],
+        dtype=int,
+    ).reshape(-1, 2)
+    alike = metric_length(structure, least[pairs[:, 0]] - least[pairs[:, 1]]) < SAME_STATE
+    family = components(store.count, np.concatenate([ends, pairs[alike]]))
+    size = np.bincount(piece[over], minlength=piece.max(initial=-1) + 1)[piece]
+    largest = over[np.lexsort((piece[over], -size[over], family[over]))]
+    first = largest[np.unique(family[largest], return_index=True)[1]]
+    return over[np.isin(piece[over], piece[first])]
