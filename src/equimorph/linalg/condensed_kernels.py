@@ -108,7 +108,6 @@ def _set_ties(stiffness, e, columns):
 @njit(**INNER)
 def _reduce_tile(lower, base, inner, columns, ties, first):
     """Forward-substitute a tile in an element's inner nodes, and take them out of its vertices."""
-    left, right = load8(columns, first - TILE), load8(columns, first + inner * TILE)
     for i in range(inner):
         row, at = base + i * inner * GROUP, first + i * TILE
         value = load8(columns, at)
@@ -116,11 +115,19 @@ def _reduce_tile(lower, base, inner, columns, ties, first):
             factor = repeat8(load(lower, row + j * GROUP))
             value = value - factor * load8(columns, first + j * TILE)
         store(columns, at, value)
-        pivot = load(lower, row + i * GROUP)
-        left = left - repeat8(load(columns, ties + i * TILE) * pivot) * value
-        right = right - repeat8(load(columns, ties + i * TILE + 1) * pivot) * value
-    store(columns, first - TILE, left)
-    store(columns, first + inner * TILE, right)
+    # one after the other: sums for both vertices do not fit in the registers
+    _take_out(lower, base, inner, columns, ties, first, first - TILE)
+    _take_out(lower, base, inner, columns, ties + 1, first, first + inner * TILE)
+
+
+@njit(**{**INNER, "forceinline": True})
+def _take_out(lower, base, inner, columns, tie, first, vertex):
+    """Take the inner nodes of an element out of the columns of a vertex; `tie`: its column."""
+    value = load8(columns, vertex)
+    for i in range(inner):
+        factor = load(columns, tie + i * TILE) * load(lower, base + (i * inner + i) * GROUP)
+        value = value - repeat8(factor) * load8(columns, first + i * TILE)
+    store(columns, vertex, value)
 
 
 @njit(**INNER)
@@ -178,7 +185,7 @@ def start_block(diagonal, vertices, extremes):
     store(vertices, 0, load(diagonal, 0))
 
 
-@njit(**INNER)
+@njit(**{**INNER, "forceinline": True})
 def reduce_group(stiffness, group, diagonal, ends, tiles, lower, vertices, columns, extremes):
     """Factor the elements of a group and forward-reduce their columns in place.
 

@@ -82,7 +82,7 @@ def _step(state, pull, terms, waves, slopes, distance):
             store(pull, j, load(pull, j) + distance * load(pull, j + 1))
 
 
-@njit(**INNER)
+@njit(**{**INNER, "forceinline": True})
 def _follow(state, pull, terms, lam, waves, slopes, moves):
     """Move a local state over the distance of each lane, in equal steps that its series can take.
 
@@ -248,7 +248,7 @@ def _vertex_maximum(stiffness, pressures, breaks, theta, forces, ends, best):
     store(best, 1, where)
 
 
-@njit(**INNER)
+@njit(**{**INNER, "forceinline": True})
 def _note_extrema(e, breaks, nodes, integral, forces, ends, best, found, count, spill):
     """Append the extrema in an element that may exceed the best: bound, element + t, width.
 
