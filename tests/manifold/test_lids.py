@@ -9,6 +9,7 @@ from typecheck import unchecked
 
 BOX = em.Box(a=(-1.0, 1.1), b=(-1.0, 1.2), c=(-0.9, 1.0))
 SHEET = "(x - 0.3*a + 0.2*b**2 - 0.1*c)**2/2"
+CUSP = "x**4/4 - (a + 0.3*c)*x**2/2 - (b + 0.2*c)*x"
 UMBILIC = "x**3/3 + y**3/3 + 0.6*x*y - (a + 0.2*c**2)*x - (b - 0.3*c)*y"
 
 
@@ -80,6 +81,26 @@ def test_wedges_between_two_constraints_are_one_piece(angle, turn):
     assert_covers(eset, excess, 0.06)
 
 
+@pytest.mark.parametrize("lean", [-0.4, -0.3])
+def test_sides_that_end_in_a_kink_stay_in_their_triangles(lean):
+    """From between its ends Newton's method follows the weaker bound, away from the edge.
+
+    With points beyond the side 51 cells of the first wedge were undecided, of 920 equilibria.
+    """
+
+    def excess(z, p):
+        u = np.cos(0.7) * p[:, 0] + np.sin(0.7) * p[:, 1] + lean * p[:, 2]
+        v = np.cos(0.7) * p[:, 1] - np.sin(0.7) * p[:, 0] + 0.15 * p[:, 2] + 0.05 * z[:, 0]
+        far = np.tan(0.15) * (u + 0.45)
+        return np.maximum(0.2 * (v - far), -v - far)
+
+    eset = bounded(excess)
+    assert_faithful(eset)
+    assert (eset.audit.components, eset.audit.euler_characteristic) == (1, 1)
+    assert eset.audit.bisected == 0
+    assert_covers(eset, excess, 0.06)
+
+
 @pytest.mark.parametrize(
     ("angle", "turn"), [(0.9, 0.2), (0.9, 0.7), (0.3, 0.2), (0.15, 0.7), (0.08, 0.7), (0.04, 0.2)]
 )
@@ -123,3 +144,41 @@ def test_lids_are_parted_along_the_folds_of_an_umbilic(limit, most):
     assert_faithful(eset)
     assert (eset.audit.components, eset.audit.euler_characteristic) == (1, 1)
     assert eset.audit.vertices < most
+
+
+@pytest.mark.parametrize(
+    ("normal", "limit", "most"),
+    [
+        ((0.3, -0.2, 1.0), 0.05, 12),
+        ((0.8, 0.3, 0.6), 0.3, 6),
+        ((0.2, 0.9, 0.4), 0.2, 0),
+        ((-0.6, 0.2, 0.8), 0.2, 3),
+    ],
+)
+def test_lids_may_meet_cusps(normal, limit, most):
+    """Cells at cusps are overturned, whatever they are coned from: 20, 9, 6 and 5 were bisected.
+
+    States are counted by the roots of x³ = (a + 0.3 c) x + b + 0.2 c.
+    """
+
+    def excess(z, p):
+        return p @ np.array(normal) + 0.1 * z[:, 0] - limit
+
+    eset = bounded(excess, CUSP)
+    assert_faithful(eset)
+    assert (eset.audit.components, eset.audit.euler_characteristic) == (1, 1)
+    assert eset.audit.bisected <= most
+    places = np.random.default_rng(3).uniform(BOX.lower, BOX.upper, (300, 3))
+    a, b, c = places.T
+    wanted, clear = np.zeros((2, len(places)))
+    for k, (slope, shift) in enumerate(zip(a + 0.3 * c, b + 0.2 * c, strict=True)):
+        roots = np.roots([1.0, 0.0, -slope, -shift])
+        real = roots[np.abs(roots.imag) < 1e-9].real
+        at = excess(real[:, None], np.tile(places[k], (len(real), 1)))
+        wanted[k] = np.count_nonzero(at <= 0.0)
+        # coarse cells miss slivers at folds and at the bound
+        clear[k] = np.abs(4.0 * slope**3 - 27.0 * shift**2) > 0.3 and np.abs(at).min() > 0.05
+    with unchecked():
+        found = [len(each.states) for each in eset.over(a=a, b=b, c=c)]
+    assert clear.sum() > 150
+    assert np.array_equal(np.array(found)[clear > 0], wanted[clear > 0])

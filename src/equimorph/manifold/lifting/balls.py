@@ -14,6 +14,7 @@ from equimorph.arrays import Bool, Int, Items
 from equimorph.manifold.complex.base_mesh import BaseMesh
 from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.simplices import volumes
+from equimorph.manifold.geometry.tangents import fold_forms
 from equimorph.manifold.lifting.discs import Discs
 from equimorph.manifold.lifting.inner_points import grouped, groups_of, marks_of, pin_inside
 from equimorph.manifold.lifting.lids import close_rims, joined_by_tubes
@@ -75,7 +76,9 @@ def fill(pairing: Pairing, discs: Discs, wanted: Bool[np.ndarray, " N"]) -> Ball
     known = pairing.points.p[
         : pairing.points.count
     ]  # no point has number −1, the last one stands in
-    apexes, overturned = upright_apexes(parts, middles, apexes, known[:, pairing.setting.free])
+    apexes, overturned = upright_apexes(
+        parts, middles, apexes, known[:, pairing.setting.free], _at_cusps(pairing, parts)
+    )
     own = closed.owner[parts.region_surface]
     doubtful[own[overturned & ((parts.first_curve < 0) | _large(pairing.mesh)[own])]] = True
     filled = _cone(parts, middles, apexes, ~doubtful[closed.owner])
@@ -91,6 +94,17 @@ def fill(pairing: Pairing, discs: Discs, wanted: Bool[np.ndarray, " N"]) -> Ball
         filled.crossing_owner,
         np.flatnonzero(doubtful),
     )
+
+
+def _at_cusps(pairing: Pairing, parts: Parts) -> Bool[np.ndarray, " regions"]:
+    """Regions with a fold on which a cusp lies between two neighbours around the tetrahedron."""
+    store, out = pairing.points, np.zeros(len(parts.region_surface), bool)
+    own = np.flatnonzero(~parts.curve_met[parts.curve])
+    points, ends = np.unique(parts.folds[own], return_inverse=True)
+    forms = fold_forms(pairing.setting, store.z[points], store.p[points])
+    cusps = own[forms.parted_by_cusps(*ends.reshape(-1, 2).T)]
+    out[parts.beside[cusps]] = True
+    return out
 
 
 def _large(mesh: BaseMesh) -> Bool[np.ndarray, " N"]:

@@ -10,9 +10,11 @@ from equimorph.manifold.lifting.crossing_discs import Group
 from equimorph.manifold.lifting.pairing import Pairing
 from equimorph.manifold.lifting.polygon_cuts import Chord, Plan, planes
 
-BULGE = 0.2
-"""How far corners may lie beyond a side of their grid triangle, as a barycentric coordinate: on
-coarse grids folds and constraints bulge so far; tips of strips lie further away."""
+LEAST = {VertexKind.CORNER: -0.2, VertexKind.CAP: 0.0}
+"""Barycentric coordinates of points in their grid triangle, at least, by kind. On coarse grids
+folds bulge beyond sides, and corners with them; tips of strips lie further away. A constraint
+between two points of one side runs inside: it is followed where Newton's method meets it elsewhere,
+before or behind a kink."""
 
 
 def groups_of(plans: list[Plan], pairs: list[Chord]) -> list[Group]:
@@ -40,14 +42,14 @@ def pin_groups(pairing: Pairing, pairs: list[Group], kinds: list[int]) -> list[i
 def _are_inside(
     pairing: Pairing, triangles: list[int], kind: int, p: Float[np.ndarray, "n P"]
 ) -> Bool[np.ndarray, " n"]:
-    """Which points are in the box, and, if they are corners, over their own grid triangles or near.
+    """Which points are in the box, and those on constraints over their own triangles or near.
 
     Folds and constraints bulge beyond sides. But where a strip between them leads on to a corner
     further away, it may pass other vertices before.
     """
     mesh, places = pairing.mesh, p[:, pairing.setting.free]
     inside = mesh.covers(places)
-    if kind == VertexKind.CORNER:
+    if kind in LEAST:
         corners = mesh.vertices[mesh.triangles[triangles]]
-        inside &= shares_in(corners, places).min(axis=1) > -BULGE
+        inside &= shares_in(corners, places).min(axis=1) > LEAST[kind]
     return inside

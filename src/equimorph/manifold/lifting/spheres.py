@@ -206,13 +206,14 @@ def upright_apexes(
     middles: Int[np.ndarray, " curves"],
     apexes: Int[np.ndarray, " regions"],
     place: Float[np.ndarray, "points 3"],
+    cusped: Bool[np.ndarray, " regions"],
 ) -> tuple[Int[np.ndarray, " regions"], Bool[np.ndarray, " regions"]]:
     """Apexes, or points in their stead that overturn less, and the regions overturned even so.
 
     Points from which lids or folds around the region are drawn can be taken. Over the faces of its
     grid tetrahedron a region is coned upright from all points inside, if the discs there are
     upright; those at cusps are not, at any scale, nor are fans of several folds that meet there:
-    regions at folds count only if they have a lid.
+    regions at folds count only if they have a lid, and of those at cusps only the lids count.
     """
     fans, sides = fans_of(parts, middles)
     facets = np.concatenate([parts.closed.corners, fans, fans])
@@ -222,7 +223,9 @@ def upright_apexes(
     lidded = np.zeros(count, bool)
     lidded[parts.region[parts.closed.lid]] = True
     folded = parts.first_curve >= 0
-    inner = np.concatenate([parts.closed.lid, np.ones(2 * len(fans), bool)]) | ~folded[region]
+    inner = (
+        np.concatenate([parts.closed.lid, ~cusped[parts.beside[sides].T.ravel()]]) | ~folded[region]
+    )
     best, least = apexes.copy(), np.full(count, np.inf)
     for candidates in (apexes, *_inner_points(parts, middles)):
         corners = np.concatenate([facets, candidates[region, None]], axis=1)
