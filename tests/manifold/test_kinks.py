@@ -120,8 +120,11 @@ def test_the_audit_names_cells_of_a_wrong_index_and_sense():
     assert not contradictions(eset.points, eset.kinds, eset.cells, eset.cell_index).any()
     # a point pushed through the opposite facet turns its cell over
     sense = senses(eset.cells, eset.cell_index, eset.coordinates, adjacency(eset.cells))
-    cell = np.flatnonzero(regular[eset.cells].all(axis=1))[0]
+    inner = np.flatnonzero(regular[eset.cells].all(axis=1))
     place = eset.coordinates.copy()
+    corners = place[eset.cells[inner]]
+    # slivers do not count: the largest one is none
+    cell = inner[np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])).argmax()]
     corners = place[eset.cells[cell]]
     place[eset.cells[cell, 0]] = 2 * corners[1:].mean(axis=0) - corners[0]
     turned = senses(eset.cells, eset.cell_index, place, adjacency(eset.cells)).overturned
