@@ -10,7 +10,7 @@ from equimorph.manifold.lifting.crossing_discs import Group
 from equimorph.manifold.lifting.pairing import Pairing
 from equimorph.manifold.lifting.polygon_cuts import Chord, Plan, planes
 
-LEAST = {VertexKind.CORNER: -0.2, VertexKind.CAP: 0.0}
+LEAST: dict[int, float] = {VertexKind.CORNER: -0.2, VertexKind.CAP: 0.0}
 """Barycentric coordinates of points in their grid triangle, at least, by kind. On coarse grids
 folds bulge beyond sides, and corners with them; tips of strips lie further away. A constraint
 between two points of one side runs inside: it is followed where Newton's method meets it elsewhere,
