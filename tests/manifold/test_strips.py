@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import equimorph as em
+from oracles import rods
 from oracles.complexes import assert_faithful
 from typecheck import unchecked
 
@@ -180,3 +181,20 @@ def test_states_over_strips_narrower_than_their_bulge_are_found(level, width, gr
     count = np.bincount(found.point, minlength=len(b))
     np.testing.assert_array_equal(count, (root <= width) * 1 + (2.0 * root <= width))
     np.testing.assert_allclose(np.abs(found.states.z[:, 0]), root[found.point], atol=1e-9)
+
+
+@pytest.mark.slow
+def test_the_constraint_is_closed_on_the_side_of_the_triangle_where_the_set_is():
+    """A strip between two parts of a constraint ends in a tip beyond a side: a cell lay before it.
+
+    The tip that was found was on the other side, where the strip is, and no bisection helped.
+    """
+    rod, _, _ = rods.rolling_rod(6, 9)
+    eset = em.equilibrium_set(
+        rod,
+        em.Box(theta_A=(-0.0267, 0.6679), offset=(-0.2507, 0.41)),
+        fixed={"P": 0.0},
+        within=[rod.max_curvature <= 12.17],
+        intervals=(14, 7),
+    )
+    assert eset.audit.clean
