@@ -175,7 +175,7 @@ class _Ledger:
         self.z, self.p = self.begun.z.copy(), self.begun.p.copy()
         self._ahead = self.p.copy()
         self.at, self.length = np.zeros(lanes), np.zeros(lanes)
-        self.index = self.begun.structure.index(self.z, self.p)
+        self.index = self.begun.index.copy()
         self.over = violations(self.begun, self.within)
         self.code, self.words = (
             np.where(self.over, EventCode.CONSTRAINT, EventCode.ARRIVED),
@@ -224,8 +224,8 @@ class _Ledger:
         if len(met):
             given = self.z[met], self.p[met], self._ahead[met]
             worst = active_constraints(within, *given)
-            for lane, which in zip(met, worst, strict=True):
-                self.detail[int(lane)] = str(within[which])
+            names = np.array([str(each) for each in within])
+            self.detail.update(zip(met.tolist(), names[worst].tolist(), strict=True))
             for which in np.unique(worst):  # lanes that begin beyond have met nothing
                 lanes = met[(worst == which) & ~self.over[met]]
                 kind[lanes] = within[which].event
