@@ -86,7 +86,9 @@ def find_equilibria(
     equilibrium and followed both ways through folds: where they return to `at` they give further
     ones, through which lines are laid again, until nothing new comes. Images under symmetries that
     leave `at` unchanged belong to each run. States that the discretisation does not resolve, or
-    that violate `within`, are dropped. While only one run found some equilibrium, runs are added.
+    that violate `within`, are dropped. States that differ by whole turns of what nothing keeps from
+    turning, like a rod between pins, are one. While only one run found some equilibrium, runs are
+    added.
 
     Then the energy is followed downwards from every state of index one until that leads to nothing
     new, and saddles are searched between minima that no chain of saddles joins: so no stable state
