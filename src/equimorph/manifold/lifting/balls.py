@@ -4,6 +4,8 @@ A sphere of four triangles of one index bounds one tetrahedron. Others are coned
 inside: on the fold surface that parts two indices, on the constraint that cuts the ball off, else
 near the centroid of its vertices. Several closed fold curves on a sphere each bound a disc of the
 fold surface.
+
+See docs/decisions.md, "At cusps only lids must be upright".
 """
 
 from dataclasses import dataclass
