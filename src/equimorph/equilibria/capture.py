@@ -72,9 +72,10 @@ class Completeness:
         """Number of equilibria at about 95 % confidence, if all are as easy to find as those found.
 
         Largest number that the profile likelihood does not reject [Cormack1992]_; infinite where
-        no equilibrium was found twice, or some that are not resolved. Never below `estimate`.
+        no equilibrium was found twice, or some that are not resolved, or where none was found and
+        no random guess led to any state. Never below `estimate`.
         """
-        if self.unresolved:
+        if self.unresolved or (self.found == 0 and self.starts > 0 and self.arrived == 0):
             return np.inf
         if self.found == 0:
             return self.estimate

@@ -345,21 +345,34 @@ class FrameMechanics(DiscreteStructure):
     # --- guesses --------------------------------------------------------------------------------
 
     def sample(self, p: Parameters, generator: np.random.Generator) -> Lanes:
-        """Random turns of the joints, waves along the members, and forces.
+        """Random turns of the joints around those of supports, waves along the members, and forces.
 
         A few half waves in each member and forces of the size of its buckling load.
         """
         model, lanes = self.model, len(p)
         nodes = np.zeros((lanes, len(model.place)))
-        turn = generator.normal(size=(lanes, len(model.network.joints)))
+        around = self._turns_of_supports(p)
+        turn = generator.normal(size=around.shape)
         modes, s = np.arange(1, 4), np.linspace(0.0, 1.0, model.piece_nodes.shape[1])
         size = generator.uniform(size=(lanes, 1))
         for row, ends in zip(model.piece_nodes, model.network.ends, strict=True):
-            base = turn[:, ends[:1]] * (1.0 - s) + turn[:, ends[1:]] * s
+            base, middle = (
+                each[:, ends[:1]] * (1.0 - s) + each[:, ends[1:]] * s for each in (turn, around)
+            )
             waves = generator.normal(size=(lanes, len(modes))) * (1.5 / modes)
-            nodes[:, row] = size * (0.5 * base + waves @ np.sin(np.pi * np.outer(modes, s)))
+            nodes[:, row] = middle + size * (
+                0.5 * base + waves @ np.sin(np.pi * np.outer(modes, s))
+            )
         forces = 10.0 * size * generator.normal(size=(lanes, self.constraints))
         return np.concatenate([nodes[:, model.place >= 0], forces], axis=1)
+
+    def _turns_of_supports(self, p: Parameters) -> Float[np.ndarray, "lanes joints"]:
+        """Turns that supports hold, or springs have at rest; their mean where there is neither."""
+        model, node = self.model, self.model.joint_nodes
+        known = ((model.place < 0) | (model.springs > 0.0))[node] & (node >= 0)
+        found = (self.scalars(np.zeros((len(p), self.size)), p) @ model.turned.T)[:, node]
+        mean = found[:, known].sum(axis=1, keepdims=True) / max(int(known.sum()), 1)
+        return np.where(known, found, mean)
 
     @cached_property
     def whole_turns(self) -> Float[np.ndarray, "turns size"]:

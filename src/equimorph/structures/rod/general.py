@@ -279,21 +279,22 @@ class GeneralMechanics(GeneralInertia):
         return self.fused_advance(advance_lanes, shared, z, p, dp, row, corner, defect)
 
     def sample(self, p: Parameters, generator: np.random.Generator) -> Lanes:
-        """Random curvatures between the end angles, with random multipliers."""
+        """Random curvatures between the angles of ends, or of their springs at rest; forces."""
         lanes, s = len(p), self.mesh.nodes
         modes = np.arange(1, 9)
         amplitude = generator.normal(size=(lanes, len(modes))) * (3.0 / modes)
         amplitude *= generator.uniform(size=(lanes, 1))
         y = np.concatenate([np.zeros((lanes, self.constraints)), p, np.ones((lanes, 1))], axis=1)
-        ends = np.einsum("kj,lj->lk", self.model.turned, y)
+        ends = np.einsum("kj,lj->lk", self.model.turned + self.model.rest, y)
         start, stop = self.model.held
+        known = np.array(self.model.held) | (self.model.springs > 0.0)
+        share = s if known.all() else np.full_like(s, float(known[1]))
+        base = ends[:, :1] * (1 - share) + ends[:, 1:] * share
         if start == stop:
             waves = np.sin(np.pi * np.outer(modes, s))
-            tilt = 0.0 if start else generator.normal(size=(lanes, 1))
-            base = ends[:, :1] * (1 - s) + ends[:, 1:] * s + tilt
+            base = base + (0.0 if start else generator.normal(size=(lanes, 1)))
         else:
             waves = np.sin(np.pi * np.outer(modes - 0.5, s if start else 1 - s))
-            base = ends.sum(axis=1)[:, None] * np.ones_like(s)
         theta = (base + amplitude @ waves)[:, self.unknown_nodes]
         forces = generator.normal(size=(lanes, self.constraints)) * FORCES
         return np.concatenate([theta, forces], axis=1)
