@@ -159,9 +159,19 @@ class Pools:
             begin = len(self.z)
             if len(new) == 0:
                 return
+            self._turn_over(new)
             group = self.group[new]
             states = np.bincount(self.group)[group]
             self.lay_lines(np.repeat(new, np.clip(enough // states, LINES, 3 * LINES)))
+
+    def _turn_over(self, lanes: Numbers) -> None:
+        """Newton homotopies from states turned by whole turns that springs alone resist."""
+        turns = self.ground.structure.sprung_turns
+        if len(turns) == 0:
+            return
+        group = np.tile(self.group[lanes], 2 * len(turns))
+        guess = np.concatenate([self.z[lanes] + turn for turn in (*turns, *-turns)])
+        self._by_homotopy(guess, group)
 
     def push(self, begin: int = 0) -> None:
         """Push equilibria, those before `begin` left out, both ways by random forces through folds.

@@ -247,6 +247,11 @@ class Structure(Rebuilt, Inertial):
         return np.zeros((0, self.size))
 
     @property
+    def sprung_turns(self) -> Float[np.ndarray, "turns size"]:
+        """Changes of z by whole turns that springs alone resist; none by default."""
+        return np.zeros((0, self.size))
+
+    @property
     def validity(self) -> tuple[Constraint, ...]:
         """Constraints beyond which the energy does not describe the structure; none by default.
 

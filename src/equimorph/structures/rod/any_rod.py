@@ -177,6 +177,11 @@ class AnyRod(HeavyRod, Refinable):
         """Whole turns of a rod whose ends may turn."""
         return self.mechanics.whole_turns
 
+    @property
+    def sprung_turns(self) -> Float[np.ndarray, "turns size"]:
+        """Whole turns of a rod that springs alone resist."""
+        return self.mechanics.sprung_turns
+
     def symmetries(self) -> tuple[Symmetry, ...]:
         """Mirror images and half turns of equilibria that are equilibria."""
         return self._symmetries

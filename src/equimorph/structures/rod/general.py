@@ -126,9 +126,18 @@ class GeneralMechanics(GeneralInertia):
     @cached_property
     def whole_turns(self) -> Float[np.ndarray, "turns size"]:
         """A turn by 2π if the angles of both ends are free."""
+        return self._turn[: not (any(self.model.held) or self.model.springs.any())]
+
+    @cached_property
+    def sprung_turns(self) -> Float[np.ndarray, "turns size"]:
+        """A turn by 2π if no angle is held, but one by a spring."""
+        return self._turn[: not any(self.model.held) and bool(self.model.springs.any())]
+
+    @property
+    def _turn(self) -> Float[np.ndarray, "1 size"]:
         turn = np.zeros((1, self.size))
         turn[:, : self.unknowns] = 2.0 * np.pi
-        return turn[: not (any(self.model.held) or self.model.springs.any())]
+        return turn
 
     @property
     def is_extensible(self) -> bool:

@@ -90,6 +90,11 @@ class RodMechanics(Equations):
         """Changes of z after which a state is the same; none by default."""
         return np.zeros((0, self.size))
 
+    @property
+    def sprung_turns(self) -> Float[np.ndarray, "turns size"]:
+        """Changes of z by whole turns that springs alone resist; none by default."""
+        return np.zeros((0, self.size))
+
     @abstractmethod
     def resolved(self, z: Lanes, p: Parameters) -> Flags:
         """Whether the highest Legendre coefficients of the rotations are small in every element."""
