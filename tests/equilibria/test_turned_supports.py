@@ -1,4 +1,4 @@
-"""Searches where supports have turned: by more than guesses around zero reach, or by whole turns."""
+"""Searches where supports have turned by more than guesses around zero reach."""
 
 import numpy as np
 import pytest

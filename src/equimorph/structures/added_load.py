@@ -188,6 +188,11 @@ class Pushed(Structure):
         """Whole turns of the structure."""
         return self._base.whole_turns
 
+    @property
+    def sprung_turns(self) -> Float[np.ndarray, "turns size"]:
+        """Whole turns of the structure that springs alone resist."""
+        return self._base.sprung_turns
+
     def shape(
         self, z: Lanes, p: Parameters, s: Float[np.ndarray, " points"] | None = None
     ) -> Float[np.ndarray, "lanes points space"]:

@@ -372,7 +372,7 @@ class FrameMechanics(DiscreteStructure):
         known = ((model.place < 0) | (model.springs > 0.0))[node] & (node >= 0)
         found = (self.scalars(np.zeros((len(p), self.size)), p) @ model.turned.T)[:, node]
         mean = found[:, known].sum(axis=1, keepdims=True) / max(int(known.sum()), 1)
-        return np.where(known, found, mean)
+        return np.asarray(np.where(known, found, mean))
 
     @cached_property
     def whole_turns(self) -> Float[np.ndarray, "turns size"]:
