@@ -5,6 +5,8 @@ the multipliers. As for rods in space, ½ k m (|q|² − 1)² keeps lengths at 1
 "Rotations in space".
 """
 
+from functools import cached_property
+
 import numpy as np
 
 from equimorph.arrays import Float, Lanes, Parameters, Scalars
@@ -48,6 +50,12 @@ class SpatialFrameLagrangian:
                     "to the frame, and the resolution, that made them."
                 )
         return np.concatenate([z[:, self.unknowns :], p, np.ones((len(z), 1))], axis=1)
+
+    @cached_property
+    def whole_turns(self) -> Float[np.ndarray, "turns size"]:
+        """Turns by 4π of each hinge: rotations are doubly covered."""
+        turns = np.eye(self.unknowns, self.unknowns + self.constraints)[self._rows :]
+        return np.asarray(4.0 * np.pi * turns)
 
     def quaternions(self, z: Lanes) -> Float[np.ndarray, "lanes free 4"]:
         """Quaternions of the free nodes."""

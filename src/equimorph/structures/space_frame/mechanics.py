@@ -384,11 +384,6 @@ class SpatialFrameMechanics(SpatialFrameLagrangian, JointEquations):
         return are_near(self.turns(z, p)[:, self.model.nodes])
 
     @cached_property
-    def whole_turns(self) -> Float[np.ndarray, "turns size"]:
-        """Turns by 4π of each hinge: rotations are doubly covered."""
-        return 4.0 * np.pi * np.eye(self.size)[self._rows : self.unknowns]
-
-    @cached_property
     def _tail(self) -> Float[np.ndarray, "2 order"]:
         return np.asarray(self.model.mesh.reference.to_legendre[-2:])
 
