@@ -15,7 +15,7 @@ from equimorph.manifold.geometry.topology import faces_of, keys_of
 from equimorph.manifold.queries.snap_graph import stability_boundary
 from equimorph.model import Box
 from equimorph.structures import Spring, State
-from sets import arch_set
+from sets import arch_set, spring_set
 from typecheck import unchecked
 
 
@@ -133,6 +133,17 @@ def test_shortest_way_along_the_surface_of_the_spring(spring_set, x, force):
     assert distance.along_the_set == pytest.approx(exact, rel=1e-4)
     assert distance.along_the_set >= distance.in_parameters
     assert distance.way.residual.max() < 1e-9
+
+
+def test_chains_that_become_one_when_they_are_finer():
+    """Three ways with eight links, of which two lead to the same point with 16: x_l = 1.3."""
+    eset = spring_set()
+    lengths = []
+    with unchecked():
+        for force in (-0.5, 0.5):
+            state = eset.at(x_l=1.3, F=force).stable[0]
+            lengths.append(stability_distance(eset, state).along_the_set)
+    assert lengths[0] == pytest.approx(lengths[1], rel=1e-4)
 
 
 @pytest.mark.slow

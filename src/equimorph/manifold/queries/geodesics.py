@@ -61,16 +61,22 @@ class Chains:
         """Sums of the links."""
         return [float(self._links(chain).sum()) for chain in self.chains]
 
-    def straighten(self, links: int) -> None:
-        """Straighten the chains with `links` links each, and keep one of those that become one."""
+    def straighten(self, links: int) -> list[int]:
+        """Straighten the chains with `links` links each, and keep one of those that become one.
+
+        Returns the numbers that those kept had before.
+        """
         self._divide(links)
         moving = list(range(len(self.chains)))
+        numbers = moving
         for _ in range(SWEEPS):
             if not moving:
                 break
             left, kept = self._sweep(moving), self._different()
             moving = [place for place, i in enumerate(kept) if i in left]
             self.chains = [self.chains[i] for i in kept]
+            numbers = [numbers[i] for i in kept]
+        return numbers
 
     def _different(self) -> list[int]:
         """Numbers of the chains that no earlier one is at the same place as."""

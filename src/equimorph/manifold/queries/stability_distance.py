@@ -193,10 +193,10 @@ def _along_the_set(
     few, many = LINKS
     chains.straighten(few)
     before = chains.lengths
-    chains.straighten(many)
-    for chain, short, long in zip(chains.chains, before, chains.lengths, strict=True):
+    kept = chains.straighten(many)
+    for chain, i, long in zip(chains.chains, kept, chains.lengths, strict=True):
         # chords fall short of arcs by the square of their length
-        length = (4.0 * long - short) / 3.0
+        length = (4.0 * long - before[i]) / 3.0
         if length < best[0]:
             best = (length, States(eset.structure, chain.z, chain.p))
     return best
