@@ -58,6 +58,23 @@ def test_a_coil_spring_that_has_turned_over_and_over_holds_as_many_states(turns)
     assert len(find_equilibria(rod, {"theta_A": rest, "P": TIP})) == true
 
 
+@pytest.mark.parametrize("seed", [0, 1, 2])
+@pytest.mark.parametrize("stiffness", [2.0, 5.0])
+def test_a_frame_from_a_pin_to_a_coil_spring_has_states_that_wind_it_up(stiffness, seed):
+    """Two stable states of seven were missed by seed 1, "at most 5"."""
+    frame = Frame(
+        {"A": (0, 0), "B": (1, 0)},
+        [("A", "B")],
+        {"A": "pinned", "B": {"angle": stiffness}},
+        {"P": {"B": (0, -1)}},
+        elements=6,
+    )
+    turn = np.linspace(-10.0, 10.0, 20001)  # of the spring: |M| is at most √(4 P)
+    assert 10.0 * stiffness > np.sqrt(4.0 * TIP)
+    true = crossings(shots(turn, stiffness * turn))
+    assert len(find_equilibria(frame, {"P": TIP}, seed=seed)) == true
+
+
 @pytest.mark.parametrize("seed", [0, 1])
 @pytest.mark.parametrize("turns", [0, 3])
 def test_a_rod_from_a_pin_to_a_coil_spring_has_states_that_wind_it_up(turns, seed):

@@ -6,7 +6,6 @@ from scipy.optimize import brentq
 from scipy.special import ellipe, ellipk
 
 from equimorph import Box, End, Frame, LineLoad, Rod, equilibrium_set, find_equilibria
-from equimorph.structures.whole_turns import taken_back
 from oracles import spatial_frames
 
 
@@ -20,30 +19,45 @@ def strut() -> Frame:
     )
 
 
+def sprung_strut() -> Frame:
+    """A column on a coil spring, and a member hinged at both of its ends."""
+    return Frame(
+        {"A": (0, 0), "B": (0, 1), "C": (1, 1)},
+        [("A", "B"), {"ends": ("B", "C"), "hinges": ["B", "C"]}],
+        {"A": {"x": "held", "y": "held", "angle": 3.0}, "C": "xy"},
+        {"P": {"B": (0.0, -1.0)}},
+    )
+
+
 TURNING = {
-    "strut": (strut, 1),
-    "hinges in space": (spatial_frames.shed, 2),
-    "pinned rod": (lambda: Rod(ends=("pinned", "pinned"), loads={"q": LineLoad()}), 1),
-    "rolling rod": (lambda: Rod(ends=("pinned", End("free", "free", "held"))), 1),
-    "sprung rod": (lambda: Rod(ends=(End(2.0, "held", "held"), "pinned")), 0),
-    "clamped rod": (Rod, 0),
+    "strut": (strut, 1, 0),
+    "sprung strut": (sprung_strut, 1, 1),
+    "hinges in space": (spatial_frames.shed, 2, 0),
+    "pinned rod": (lambda: Rod(ends=("pinned", "pinned"), loads={"q": LineLoad()}), 1, 0),
+    "rolling rod": (lambda: Rod(ends=("pinned", End("free", "free", "held"))), 1, 0),
+    "sprung rod": (lambda: Rod(ends=(End(2.0, "held", "held"), "pinned")), 0, 1),
+    "clamped rod": (Rod, 0, 0),
 }
 
 
 @pytest.mark.parametrize("name", TURNING)
 def test_copies_balance_like_states_and_are_taken_back(name):
-    made, count = TURNING[name]
+    made, count, sprung = TURNING[name]
     structure = made()
-    turns = structure.whole_turns
-    assert turns.shape == (count, structure.size)
+    whole = structure.whole_turns
+    turns = whole.free
+    assert (turns.shape, len(whole.sprung)) == ((count, structure.size), sprung)
     p = np.tile([0.3 if each.default is None else each.default for each in structure.parameters],
                 (8, 1))  # fmt: skip
     z = structure.sample(p, np.random.default_rng(0))
-    before, back = structure.residual(z, p), taken_back(structure, z)
+    before, back = structure.residual(z, p), whole.taken_back(z)
     for turn in (*(3.0 * turns), *-turns):
         change = np.abs(structure.residual(z + turn, p) - before).max()
         assert change < 1e-11 * np.abs(before).max()
-        np.testing.assert_allclose(taken_back(structure, z + turn), back, atol=1e-12)
+        np.testing.assert_allclose(whole.taken_back(z + turn), back, atol=1e-12)
+    for turn in whole.sprung:
+        change = structure.residual(z + turn, p) - before
+        assert np.count_nonzero(np.abs(change[0]) > 1e-9 * np.abs(before).max()) == 1  # its spring
     share = back @ turns.T / (turns**2).sum(axis=1)
     assert (np.abs(share) < 0.54).all()
 

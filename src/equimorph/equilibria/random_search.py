@@ -19,7 +19,6 @@ from equimorph.model import Constraint, worst_relative_excess
 from equimorph.structures import Structure
 from equimorph.structures.contract import Symmetry
 from equimorph.structures.metric import metric_coordinates
-from equimorph.structures.whole_turns import taken_back
 from equimorph.tolerances import SAME_STATE
 
 Groups = Numbers
@@ -87,7 +86,7 @@ class Ground:
     def pick(self, z: Lanes, group: Groups) -> Lanes:
         """One state of each orbit on which there are some, and of those whole turns away."""
         p = self.p[group]
-        return self.structure.pick_on_orbits(taken_back(self.structure, z), p, p)
+        return self.structure.pick_on_orbits(self.structure.whole_turns.taken_back(z), p, p)
 
 
 class Pools:
@@ -166,7 +165,7 @@ class Pools:
 
     def _turn_over(self, lanes: Numbers) -> None:
         """Newton homotopies from states turned by whole turns that springs alone resist."""
-        turns = self.ground.structure.sprung_turns
+        turns = self.ground.structure.whole_turns.sprung
         if len(turns) == 0:
             return
         group = np.tile(self.group[lanes], 2 * len(turns))

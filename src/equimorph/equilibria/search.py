@@ -20,7 +20,6 @@ from equimorph.errors import InputError
 from equimorph.model import Constraint, parameter_vector
 from equimorph.structures import States, Structure
 from equimorph.structures.metric import metric_length
-from equimorph.structures.whole_turns import taken_back
 
 Points = Float[np.ndarray, "points parameters"]
 
@@ -254,7 +253,7 @@ class _Catch:
         none = np.zeros((0, structure.size))
         if known is None:
             return cls(ground, none, np.zeros(0, int), 0, {}, none, None)
-        z = taken_back(structure, known.z[(known.p == point).all(axis=1)])
+        z = structure.whole_turns.taken_back(known.z[(known.p == point).all(axis=1)])
         z = z[distinct(structure, z)]
         return cls(ground, z, np.zeros(len(z), int), 1, {}, none, z)
 

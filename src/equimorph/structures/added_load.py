@@ -11,6 +11,7 @@ from equimorph.linalg import BorderedSolution, no_border, solve_bordered
 from equimorph.model import Descriptor, Parameter
 from equimorph.structures.contract import Structure
 from equimorph.structures.equations import AnyBorder, Direction, Equations, Shift
+from equimorph.structures.whole_turns import WholeTurns
 
 SHIFT = -1.0
 """Of the spectrum in units of the metric: F_z itself is singular at folds."""
@@ -184,14 +185,9 @@ class Pushed(Structure):
         return self._base.may_resolve(z, self._own(p))
 
     @property
-    def whole_turns(self) -> Float[np.ndarray, "turns size"]:
+    def whole_turns(self) -> WholeTurns:
         """Whole turns of the structure."""
         return self._base.whole_turns
-
-    @property
-    def sprung_turns(self) -> Float[np.ndarray, "turns size"]:
-        """Whole turns of the structure that springs alone resist."""
-        return self._base.sprung_turns
 
     def shape(
         self, z: Lanes, p: Parameters, s: Float[np.ndarray, " points"] | None = None

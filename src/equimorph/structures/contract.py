@@ -31,6 +31,7 @@ from equimorph.model import (
 )
 from equimorph.model.obstacle import straight_arcs
 from equimorph.structures.material_points import Inertial
+from equimorph.structures.whole_turns import WholeTurns
 from equimorph.tables import html_table
 
 
@@ -239,17 +240,9 @@ class Structure(Rebuilt, Inertial):
         return z
 
     @property
-    def whole_turns(self) -> Float[np.ndarray, "turns size"]:
-        """Changes of z after which a state is the same: whole turns of what nothing keeps from it.
-
-        None by default. Searches take back what they can; see `whole_turns.taken_back`.
-        """
-        return np.zeros((0, self.size))
-
-    @property
-    def sprung_turns(self) -> Float[np.ndarray, "turns size"]:
-        """Changes of z by whole turns that springs alone resist; none by default."""
-        return np.zeros((0, self.size))
+    def whole_turns(self) -> WholeTurns:
+        """Whole turns of what nothing, or springs alone, keep from it; none by default."""
+        return WholeTurns.none(self.size)
 
     @property
     def validity(self) -> tuple[Constraint, ...]:

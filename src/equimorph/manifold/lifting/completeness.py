@@ -27,7 +27,6 @@ from equimorph.manifold.lifting.states_in_sides import are_grazing, states_in_si
 from equimorph.manifold.lookup.exact_states import exact_states, lift_to
 from equimorph.model import Progress, are_feasible, position
 from equimorph.structures import States, join_states
-from equimorph.structures.whole_turns import taken_back
 
 STARTS = 200
 """Random starts of Newton's method in each independent search."""
@@ -242,10 +241,10 @@ def _belonging(eset: EquilibriumSet, states: States) -> States:
 
 def _lacking(found: States, eset: EquilibriumSet) -> States:
     """Those of the states, each over its own point, that a set lacks; copies of them will do."""
-    structure = eset.structure
-    found = States(structure, taken_back(structure, found.z), found.p)
+    structure, turns = eset.structure, eset.structure.whole_turns
+    found = States(structure, turns.taken_back(found.z), found.p)
     lacking = found[np.flatnonzero(~eset.holding(found)[0])]
-    for turn in (*structure.whole_turns, *-structure.whole_turns):
+    for turn in (*turns.free, *-turns.free):
         if len(lacking):
             turned = States(structure, lacking.z + turn, lacking.p)
             lacking = lacking[np.flatnonzero(~eset.holding(turned)[0])]

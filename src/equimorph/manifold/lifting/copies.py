@@ -12,7 +12,6 @@ from equimorph.arrays import Items
 from equimorph.linalg.graphs import components
 from equimorph.manifold.lifting.pairing import Pairing
 from equimorph.structures.metric import metric_length
-from equimorph.structures.whole_turns import taken_back
 from equimorph.tolerances import SAME_STATE
 
 
@@ -21,12 +20,12 @@ def without_copies(pairing: Pairing) -> Items:
     store, structure = pairing.points, pairing.setting.structure
     vertex = store.vertex[: store.count]
     over = np.flatnonzero(vertex >= 0)
-    if len(structure.whole_turns) == 0:
+    if len(structure.whole_turns.free) == 0:
         return over
     lifted = pairing.curves.end >= 0
     ends = np.stack([pairing.curves.start, pairing.curves.end], axis=1)[lifted]
     piece = components(store.count, ends)
-    least = taken_back(structure, store.z[: store.count])
+    least = structure.whole_turns.taken_back(store.z[: store.count])
     pairs = np.array(
         [pair for each in np.unique(vertex[over]) for pair in combinations(store.over(each), 2)],
         dtype=int,

@@ -19,6 +19,7 @@ from equimorph.arrays import (
     Values,
 )
 from equimorph.linalg.dense import multiply
+from equimorph.linalg.graphs import components
 from equimorph.linalg.intervals import Interval
 from equimorph.linalg.lanes import over_lanes
 from equimorph.linalg.sparse import SparseLayout
@@ -28,6 +29,7 @@ from equimorph.structures.frame.kernels import linearise_lanes, second_lanes
 from equimorph.structures.frame.model import FrameModel
 from equimorph.structures.frame.pressure import FramePressure
 from equimorph.structures.rod.planar_energy import PlanarEnergy
+from equimorph.structures.whole_turns import WholeTurns
 
 
 @dataclass(frozen=True, eq=False)
@@ -375,21 +377,16 @@ class FrameMechanics(DiscreteStructure):
         return np.asarray(np.where(known, found, mean))
 
     @cached_property
-    def whole_turns(self) -> Float[np.ndarray, "turns size"]:
-        """Turns by 2π of each rigidly joined part whose turn nothing holds."""
+    def whole_turns(self) -> WholeTurns:
+        """Turns by 2π of each rigidly joined part that no support holds."""
         model = self.model
-        part = np.arange(len(model.place))
-        for _ in part:
-            lowest = part[model.nodes].min(axis=1)
-            before = part.copy()
-            np.minimum.at(part, model.nodes, lowest[:, None])
-            if np.array_equal(part, before):
-                break
-        held = np.unique(part[(model.place < 0) | (model.springs > 0.0)])
-        free = np.setdiff1d(part, held)
-        turns = np.zeros((len(free), self.size))
-        turns[:, : self.unknowns] = 2.0 * np.pi * (part[model.place >= 0] == free[:, None])
-        return turns
+        row, free = model.piece_nodes, model.place >= 0
+        joined = np.stack([row[:, :-1], row[:, 1:]], axis=2).reshape(-1, 2)
+        part = components(len(free), joined)
+        parts = part[free] == np.setdiff1d(part, part[~free])[:, None]
+        return WholeTurns.of_parts(
+            parts, (parts & (model.springs[free] > 0.0)).any(axis=1), self.size
+        )
 
     def resolved(self, z: Lanes, p: Parameters) -> Flags:
         """Whether the highest Legendre coefficients of ψ are small in every element."""

@@ -36,6 +36,7 @@ from equimorph.structures.rod.terms import Term
 from equimorph.structures.rod.units import Units
 from equimorph.structures.states import State, States
 from equimorph.structures.unit_system import Quantity, Units as SystemSpec, unit_system
+from equimorph.structures.whole_turns import WholeTurns
 
 ENDLESS = 20.0
 """Curvature, times the length, that is proposed as the bound of a set."""
@@ -173,14 +174,9 @@ class AnyRod(HeavyRod, Refinable):
         return self.mechanics.compiled_newton
 
     @property
-    def whole_turns(self) -> Float[np.ndarray, "turns size"]:
+    def whole_turns(self) -> WholeTurns:
         """Whole turns of a rod whose ends may turn."""
         return self.mechanics.whole_turns
-
-    @property
-    def sprung_turns(self) -> Float[np.ndarray, "turns size"]:
-        """Whole turns of a rod that springs alone resist."""
-        return self.mechanics.sprung_turns
 
     def symmetries(self) -> tuple[Symmetry, ...]:
         """Mirror images and half turns of equilibria that are equilibria."""

@@ -34,6 +34,7 @@ from equimorph.structures.rod.model import RodModel, pack_tables
 from equimorph.structures.rod.planar_energy import PlanarEnergy
 from equimorph.structures.rod.pressure import EnclosedArea, coupling
 from equimorph.structures.rod.reflections import symmetries
+from equimorph.structures.whole_turns import WholeTurns
 
 Points = Float[np.ndarray, "lanes points"]
 
@@ -124,20 +125,10 @@ class GeneralMechanics(GeneralInertia):
         return np.asarray(good)
 
     @cached_property
-    def whole_turns(self) -> Float[np.ndarray, "turns size"]:
-        """A turn by 2π if the angles of both ends are free."""
-        return self._turn[: not (any(self.model.held) or self.model.springs.any())]
-
-    @cached_property
-    def sprung_turns(self) -> Float[np.ndarray, "turns size"]:
-        """A turn by 2π if no angle is held, but one by a spring."""
-        return self._turn[: not any(self.model.held) and bool(self.model.springs.any())]
-
-    @property
-    def _turn(self) -> Float[np.ndarray, "1 size"]:
-        turn = np.zeros((1, self.size))
-        turn[:, : self.unknowns] = 2.0 * np.pi
-        return turn
+    def whole_turns(self) -> WholeTurns:
+        """A turn by 2π if the angles of both ends are free, or held by springs."""
+        whole = np.ones((int(not any(self.model.held)), self.unknowns), bool)
+        return WholeTurns.of_parts(whole, self.model.springs.any() & whole[:, 0], self.size)
 
     @property
     def is_extensible(self) -> bool:

@@ -17,6 +17,7 @@ from equimorph.structures.equations import Advance, Direction, Enclosed, Equatio
 from equimorph.structures.material_points import MaterialPoints
 from equimorph.structures.rod.discretisation import Mesh, error_by_refinement
 from equimorph.structures.rod.planar_energy import PlanarEnergy
+from equimorph.structures.whole_turns import WholeTurns
 
 Bounds = Float[np.ndarray, "constraints 4"]
 LARGEST_TAIL = 1e-3
@@ -86,14 +87,9 @@ class RodMechanics(Equations):
         return np.zeros((len(z), 1))
 
     @property
-    def whole_turns(self) -> Float[np.ndarray, "turns size"]:
-        """Changes of z after which a state is the same; none by default."""
-        return np.zeros((0, self.size))
-
-    @property
-    def sprung_turns(self) -> Float[np.ndarray, "turns size"]:
-        """Changes of z by whole turns that springs alone resist; none by default."""
-        return np.zeros((0, self.size))
+    def whole_turns(self) -> WholeTurns:
+        """Whole turns of what nothing, or springs alone, keep from it; none by default."""
+        return WholeTurns.none(self.size)
 
     @abstractmethod
     def resolved(self, z: Lanes, p: Parameters) -> Flags:

@@ -26,6 +26,7 @@ from equimorph.structures.spatial.quaternions import (
     strains,
     turn_about,
 )
+from equimorph.structures.whole_turns import WholeTurns
 
 
 class SpatialFrameLagrangian:
@@ -52,10 +53,10 @@ class SpatialFrameLagrangian:
         return np.concatenate([z[:, self.unknowns :], p, np.ones((len(z), 1))], axis=1)
 
     @cached_property
-    def whole_turns(self) -> Float[np.ndarray, "turns size"]:
+    def whole_turns(self) -> WholeTurns:
         """Turns by 4π of each hinge: rotations are doubly covered."""
         turns = np.eye(self.unknowns, self.unknowns + self.constraints)[self._rows :]
-        return np.asarray(4.0 * np.pi * turns)
+        return WholeTurns(4.0 * np.pi * turns, turns[:0])
 
     def quaternions(self, z: Lanes) -> Float[np.ndarray, "lanes free 4"]:
         """Quaternions of the free nodes."""
