@@ -22,6 +22,7 @@ RIGHT: tuple[tuple[Any, Mapping[str, Any]], ...] = (
     (em.Member, {"ends": ("A", "B"), "EI": 1.0, "EA": 900.0, "curvature": 0.1, "hinges": ["B"],
                  "weight": 1.0}),
     (em.Unknown, {**SYMBOL, "lower": -3.0, "upper": 3.0}),
+    (em.Unknown, {**SYMBOL, "period": 6.3}),
     (em.Parameter, {"name": "p", "unit": "1", "scale": 1.0, "role": "load", "default": 0.5}),
     (em.End, {"angle": "free", "x": 2.0, "y": "held"}),
     (em.End, {"angle": "held", "slide": 0.5}),

@@ -5,7 +5,19 @@ import pytest
 from scipy.optimize import brentq
 from scipy.special import ellipe, ellipk
 
-from equimorph import Box, End, Frame, LineLoad, Rod, equilibrium_set, find_equilibria
+from equimorph import (
+    Box,
+    End,
+    EnergyStructure,
+    Frame,
+    LineLoad,
+    Parameter,
+    Rod,
+    Unknown,
+    equilibrium_set,
+    find_equilibria,
+)
+from equimorph.structures import from_identity
 from oracles import spatial_frames
 
 
@@ -29,7 +41,17 @@ def sprung_strut() -> Frame:
     )
 
 
+def pendulum(springs: float = 0.0) -> EnergyStructure:
+    """Two equal links that hang, turned by a couple at their pin; angles of both, and between."""
+    energy = "-2*g*cos(a) - g*cos(a + b) + k*(1 - cos(b)) - M*a"
+    angles = [Unknown(name, period=2.0 * np.pi) for name in ("a", "b")]
+    given = {"g": 1.0, "k": springs, "M": 0.0}
+    parameters = [Parameter(name, "1", 1.0, "load", value) for name, value in given.items()]
+    return EnergyStructure(energy, angles, parameters, coercive=True)
+
+
 TURNING = {
+    "pendulum": (pendulum, 2, 0),
     "strut": (strut, 1, 0),
     "sprung strut": (sprung_strut, 1, 1),
     "hinges in space": (spatial_frames.shed, 2, 0),
@@ -113,6 +135,30 @@ def test_a_set_has_one_copy_of_sheets_that_pass_half_a_turn():
     m = elastica(0.5)
     assert 4.0 * np.sqrt(m) * ellipk(m) < 7.0
     assert eset.over(rise=[-0.3, 0.0, 0.3]).states.index.tolist() == [0] * 6
+
+
+@pytest.mark.parametrize("couple", [0.0, 1.2, -2.7])
+def test_a_pendulum_of_two_links_has_four_states_until_its_couple_turns_it_over(couple):
+    """Each link stands or hangs: M = 2g sin a + g sin(a + b), 0 = sin(a + b). It had dozens."""
+    made = pendulum()
+    found = find_equilibria(made, {"g": 1.0, "k": 0.0, "M": couple})
+    turns = [np.arcsin(couple / 2.0)] if abs(couple) < 2.0 else []
+    true = [(a, b) for turn in turns for a in (turn, np.pi - turn) for b in (0.0, np.pi)]
+    assert len(found) == len(true)
+    for a, b in true:
+        gap = np.exp(1j * found.z) - np.exp(1j * np.array([a, b - a]))
+        assert np.abs(gap).max(axis=1).min() < 1e-8
+    assert sorted(found.index.tolist()) == [0, 1, 1, 2][: len(true)]
+    last = str(found.arguments[-1])
+    assert last.startswith("sum of indices: holds if the promise does (Σ(−1)^index = 0, must be 0")
+    assert from_identity(made.identity()).whole_turns.free.shape == (2, 2)
+
+
+def test_a_set_of_a_pendulum_has_one_copy_of_each_sheet():
+    eset = equilibrium_set(pendulum(), Box(M=(-0.3, 0.4)), fixed={"g": 0.7, "k": 0.4})
+    assert eset.audit.clean
+    found = find_equilibria(pendulum(), {"g": 0.7, "k": 0.4, "M": 0.25})
+    assert eset.over(M=[0.25]).states.index.tolist() == found.index.tolist()
 
 
 @pytest.mark.slow

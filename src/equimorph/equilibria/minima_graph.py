@@ -248,8 +248,9 @@ def arguments_of(graph: MinimaGraph, group: int) -> tuple[Argument, ...]:
 
 
 def contradicts(graph: MinimaGraph, group: int) -> bool:
-    """Whether the sum of the indices applies and is not one: then states are missing."""
-    return _growth(graph, group).applies and index_sum(graph, group) != 1
+    """Whether the sum of the indices applies and is another one: then states are missing."""
+    growth = _growth(graph, group)
+    return growth.applies and index_sum(graph, group) != growth.total
 
 
 def _growth(graph: MinimaGraph, group: int) -> Growth:
@@ -303,12 +304,12 @@ def _graph(graph: MinimaGraph, group: int) -> Argument:
 
 
 def _sum(graph: MinimaGraph, group: int) -> Argument:
-    """Σ (−1)^index = 1 on Rⁿ where the energy grows at infinity."""
+    """Σ (−1)^index is known where the energy grows at infinity."""
     name, growth = "sum of indices", _growth(graph, group)
     if not growth.applies:
         return Argument(name, Standing.NOT_APPLICABLE, growth.reason)
     total = index_sum(graph, group)
-    detail = f"Σ(−1)^index = {total}, must be 1; {growth.reason}"
-    if total != 1:
+    detail = f"Σ(−1)^index = {total}, must be {growth.total}; {growth.reason}"
+    if total != growth.total:
         return Argument(name, Standing.OPEN, detail)
     return Argument(name, Standing.PROMISED if growth.promised else Standing.HOLDS, detail)

@@ -85,16 +85,19 @@ Readers = Mapping[str, Callable[[str], Any]]
 
 @dataclass(frozen=True)
 class Growth:
-    """Whether the energy is smooth on all of Rⁿ and grows there at infinity.
+    """Whether the energy is smooth for all u and grows at infinity.
 
-    Then Σ (−1)^index of all equilibria is 1 [Milnor1965]_.
+    Then Σ (−1)^index of all equilibria is the Euler characteristic of the configurations: 1 of Rⁿ,
+    and 0 where angles turn over [Milnor1965]_.
 
-    applies: whether that is so, shown or promised; promised: by the author of the energy only.
+    applies: whether that is so, shown or promised; promised: by the author of the energy only;
+    total: the sum.
     """
 
     applies: bool
     reason: str
     promised: bool = False
+    total: int = 1
 
 
 class Structure(Rebuilt, Inertial):

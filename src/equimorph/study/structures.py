@@ -290,7 +290,10 @@ SpatialMemberSection = part_of(
 LIMITS = {"lower": (Number | None, None), "upper": (Number | None, None)}
 UnknownSection = part_of(
     Unknown,
-    {"name": str, "natural": Formula, "guesses": Interval, **LIMITS, "mass": Positive, "unit": str},
+    {
+        **{"name": str, "natural": Formula, "guesses": Interval, **LIMITS, "mass": Positive},
+        **{"unit": str, "period": (Positive | None, None)},
+    },
 )
 ParameterSection = part_of(
     Parameter,

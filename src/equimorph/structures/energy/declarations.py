@@ -10,6 +10,8 @@ import numpy as np
 from equimorph.argument_checks import check_arguments
 from equimorph.argument_kinds import is_listed, short
 from equimorph.argument_notes import BOUNDS
+from equimorph.argument_vocabulary import PERIOD
+from equimorph.arrays import Float
 from equimorph.errors import InputError
 from equimorph.model import Parameter
 from equimorph.structures.energy.expressions import (
@@ -39,7 +41,7 @@ class Unknown:
         Its value in the natural state: a number, or an expression in the parameters.
     guesses
         Range from which guesses are drawn. None: between `lower` and `upper` if both are finite,
-        else within 1 of the natural value.
+        else within half a `period`, or 1, of the natural value.
     lower, upper
         Open limits of its meaning: states beyond them, behind a singularity of the energy say, do
         not count. A part of the set is cut out by constraints of the problem, not by these.
@@ -47,6 +49,9 @@ class Unknown:
         Its weight in the metric; positive.
     unit
         Unit of the descriptor of its name.
+    period
+        Change after which a state is the same, like 2π of the angle of a pendulum. Searches find
+        one of the states that differ by whole periods.
     """
 
     name: str
@@ -56,9 +61,15 @@ class Unknown:
     upper: float = np.inf
     mass: float = 1.0
     unit: str = "1"
+    period: Annotated[float, PERIOD] = np.inf
 
     def __post_init__(self) -> None:
         """Check the limits."""
+        if np.isfinite(self.period) and np.isfinite([self.lower, self.upper]).any():
+            raise InputError(
+                f"`period` of {self.name} must not stand beside `lower` or `upper`; got "
+                f"{self.period!r}. Bound what is drawn by `guesses`."
+            )
         if not self.lower < self.upper:
             raise InputError(
                 f"`lower` of {self.name} must be less than `upper`; got {self.lower!r} and "
@@ -72,6 +83,11 @@ class Unknown:
             return float(self.guesses[0]), float(self.guesses[1])
         bounded = np.isfinite(self.lower) and np.isfinite(self.upper)
         return (self.lower, self.upper) if bounded else None
+
+    @property
+    def reach(self) -> float:
+        """Largest distance of guesses from the natural value, where there is no range."""
+        return 0.5 * self.period if np.isfinite(self.period) else 1.0
 
 
 @dataclass(frozen=True)
@@ -140,6 +156,12 @@ def unknowns_of(given: UnknownSpec | Sequence[UnknownSpec]) -> tuple[Unknown, ..
     if not unknowns:
         raise InputError("`unknowns` must name at least one unknown; got none.")
     return tuple(unknowns)
+
+
+def periods_of(unknowns: Sequence[Unknown], size: int) -> Float[np.ndarray, "periods size"]:
+    """Changes of z by the periods of the unknowns, one for each that has one."""
+    periods = np.array([each.period for each in unknowns])
+    return np.asarray(np.diag(periods)[np.isfinite(periods)] @ np.eye(len(unknowns), size))
 
 
 def parameters_of(given: Iterable[ParameterSpec]) -> tuple[Parameter, ...]:

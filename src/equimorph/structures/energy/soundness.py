@@ -1,4 +1,4 @@
-"""Whether an energy bounds its states, and where its constraints become dependent.
+"""Whether an energy bounds its states, or repeats them, and where constraints become dependent.
 
 A polynomial energy bounds its states if its leading form is positive definite. The gradients of the
 constraints, in the metric and each relative to its typical size, span what constraint forces can
@@ -9,11 +9,14 @@ equilibrium is there, and sets end.
 See docs/decisions.md, "Structures say where their energy ends".
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
 from equimorph.arrays import Entries, Float, Int, Lanes, Parameters, Values
+from equimorph.errors import InputError
+from equimorph.structures.contract import Growth
+from equimorph.structures.energy.declarations import Unknown, periods_of
 from equimorph.structures.energy.kernels import OPERATIONS
 from equimorph.structures.energy.tape import Tape
 
@@ -30,8 +33,50 @@ MOST_BOXES = 50_000
 """Boxes on the sides of a cube in which the sign of a form is looked for."""
 VANISHING = 1e-12
 """Coefficient, relative to the largest one, that is round-off."""
+PERIODIC = 1e-8
+"""Change of a force over a period, relative to 1 + its size, that is round-off."""
 CLEAR = 1e-9
 """Value of a form on the cube, relative to its largest coefficient, that is surely positive."""
+
+
+def growth_of(
+    energy: Tape,
+    unknowns: Sequence[Unknown],
+    constraints: int,
+    promised: bool,
+    p: Float[np.ndarray, " parameters"],
+) -> Growth:
+    """Whether an energy grows at infinity: shown for polynomials, or promised."""
+    bounded = [each.name for each in unknowns if np.isfinite([each.lower, each.upper]).any()]
+    if constraints or bounded:
+        why = "constraints" if constraints else f"limits of {', '.join(bounded)}"
+        return Growth(False, f"the configurations have {why}")
+    if promised:
+        total = int(not any(np.isfinite(each.period) for each in unknowns))
+        return Growth(True, "the author promises that the energy grows at infinity", True, total)
+    known = grows(energy, len(unknowns), p)
+    if known is None:
+        return Growth(False, "the energy is no polynomial, and `coercive=True` is not promised")
+    if not known:
+        return Growth(False, "the leading form of the energy is not shown positive definite")
+    return Growth(True, "a polynomial with a positive definite leading form")
+
+
+def check_periods(
+    forces: Callable[[Lanes, Parameters], Lanes],
+    unknowns: Sequence[Unknown],
+    z: Lanes,
+    p: Parameters,
+) -> None:
+    """Refuse periods after which forces are others."""
+    turns, before = periods_of(unknowns, z.shape[1]), forces(z, p)
+    named = [each.name for each in unknowns if np.isfinite(each.period)]
+    for name, turn in zip(named, turns, strict=True):
+        if (np.abs(forces(z + turn, p) - before) > PERIODIC * (1.0 + np.abs(before))).any():
+            raise InputError(
+                f"`period` of {name} must leave all forces unchanged; got {turn.max():g}. Of two "
+                "angles joined by a spring, let one unknown be the difference, without a period."
+            )
 
 
 def grows(tape: Tape, unknowns: int, p: Float[np.ndarray, " parameters"]) -> bool | None:

@@ -25,6 +25,7 @@ from equimorph.structures.energy.declarations import (
     data_of,
     mass_rows,
     parameters_of,
+    periods_of,
     points_of,
     unknowns_of,
 )
@@ -36,9 +37,16 @@ from equimorph.structures.energy.drawing import (
     marks_of,
 )
 from equimorph.structures.energy.expressions import POINT
-from equimorph.structures.energy.soundness import DEPENDENT, SAMPLES, Independence, grows
+from equimorph.structures.energy.soundness import (
+    DEPENDENT,
+    SAMPLES,
+    Independence,
+    check_periods,
+    growth_of,
+)
 from equimorph.structures.energy.tape import Derivatives, Tape, can_enclose, casadi, enclosure, tape
 from equimorph.structures.equations import Direction, Enclosed
+from equimorph.structures.whole_turns import WholeTurns
 
 INDEPENDENCE = "constraint_independence"
 """Descriptor of structures with constraints; see `Independence`."""
@@ -79,15 +87,17 @@ class EnergyStructure(DiscreteStructure):
         the mass matrix, or its rows. The unit of time is what the numbers make it.
     coercive
         The author's promise that the energy is smooth for all values of the unknowns and grows to
-        infinity in all directions; then the sum of (−1)^index over all equilibria is 1, which tells
-        whether some are missing. Polynomials with a positive definite leading form need no promise.
+        infinity in all directions without a period; then the sum of (−1)^index over all equilibria
+        is 1, or 0 where an unknown has a period, which tells whether some are missing. Polynomials
+        with a positive definite leading form need no promise.
 
     Raises
     ------
     InputError
         For a formula that cannot be read, an unknown symbol, an unknown or parameter without
         effect, an energy that is not twice differentiable, a wrong shape, a natural state that is
-        no equilibrium with all loads at zero, or if CasADi is not installed.
+        no equilibrium with all loads at zero, a period after which forces are others, or if CasADi
+        is not installed.
 
     Examples
     --------
@@ -150,6 +160,7 @@ class EnergyStructure(DiscreteStructure):
         graph = (formulas.energy, formulas.constraints)
         self._graphs = Derivatives(self._symbols.u, self._symbols.p, *graph)
         self.check_natural_state([unknown.name for unknown in self._unknowns])
+        check_periods(self.residual, self._unknowns, *self._trials)
 
     def identity(self) -> dict[str, Any]:
         """Kind, and all formulas as texts."""
@@ -251,20 +262,8 @@ class EnergyStructure(DiscreteStructure):
 
     def growth(self, p: Float[np.ndarray, " parameters"]) -> Growth:
         """Whether the energy grows at infinity: shown for polynomials, or promised."""
-        bounded = [
-            each.name for each in self._unknowns if np.isfinite([each.lower, each.upper]).any()
-        ]
-        if self.constraints or bounded:
-            why = "constraints" if self.constraints else f"limits of {', '.join(bounded)}"
-            return Growth(False, f"the configurations have {why}")
-        if self._coercive:
-            return Growth(True, "the author promises that the energy grows at infinity", True)
-        known = grows(self._graphs.energy, self.unknowns, p)
-        if known is None:
-            return Growth(False, "the energy is no polynomial, and `coercive=True` is not promised")
-        if not known:
-            return Growth(False, "the leading form of the energy is not shown positive definite")
-        return Growth(True, "a polynomial with a positive definite leading form")
+        given = self._unknowns, self.constraints, self._coercive
+        return growth_of(self._graphs.energy, *given, p)
 
     # --- states ---------------------------------------------------------------------------------
 
@@ -289,11 +288,18 @@ class EnergyStructure(DiscreteStructure):
 
     def sample(self, p: Parameters, generator: np.random.Generator) -> Lanes:
         """Unknowns within their ranges of guesses, with the multipliers that balance them best."""
-        u = self._natural(p) + generator.uniform(-1.0, 1.0, (len(p), self.unknowns))
+        reach = np.array([each.reach for each in self._unknowns])
+        u = self._natural(p) + reach * generator.uniform(-1.0, 1.0, (len(p), self.unknowns))
         for i, unknown in enumerate(self._unknowns):
             if unknown.range is not None:
                 u[:, i] = generator.uniform(*unknown.range, len(p))
         return self._solve_multipliers(u, p)
+
+    @cached_property
+    def whole_turns(self) -> WholeTurns:
+        """Whole periods of the unknowns that have one."""
+        turns = periods_of(self._unknowns, self.size)
+        return WholeTurns(turns, turns[:0])
 
     def resolved(self, z: Lanes, p: Parameters) -> Flags:
         """Unknowns are numbers within the limits of their meaning."""
@@ -308,11 +314,17 @@ class EnergyStructure(DiscreteStructure):
         return (self.descriptor(INDEPENDENCE) >= DEPENDENT,) if self.constraints else ()
 
     @cached_property
-    def _independence(self) -> Independence:
+    def _trials(self) -> tuple[Lanes, Parameters]:
+        """Guesses at parameters that are 1 where they have no default."""
         generator = np.random.default_rng(0)
         p = np.nan_to_num(np.repeat(self._reference[None], SAMPLES, axis=0), nan=1.0)
+        return self.sample(p, generator), p
+
+    @cached_property
+    def _independence(self) -> Independence:
+        z, p = self._trials
         places = np.stack([self.layout.rows, self.layout.columns])
-        return Independence(self.entries, places, self.mass, self.sample(p, generator), p)
+        return Independence(self.entries, places, self.mass, z, p)
 
     @cached_property
     def _corners(self) -> Tape:
