@@ -83,7 +83,20 @@ def test_states_beyond_the_discretisation_are_not_counted_as_none():
     found = em.find_equilibria(arch, {"Theta": 1.0, "Delta": 0.0, "q": 200.0})
     assert len(found) == 0
     assert found.completeness.upper == np.inf
-    assert "the discretisation does not resolve: refine it" in repr(found)
+    assert "the discretisation does not resolve the state: refine it" in repr(found)
+
+
+def test_starts_that_squeeze_bars_to_nothing_are_told_what_bounds_them():
+    """Trusses cannot be refined. Of l = 1 − F with F = .995 nothing is left but the bar's kink."""
+    bars, held = [("A", "B")], {"A": "xy", "B": "y"}
+    bar = em.Truss({"A": (0, 0), "B": (1, 0)}, bars, held, {"F": {"B": (-1, 0)}})
+    found = em.find_equilibria(bar, {"F": 0.995})
+    assert "led to where a bar has collapsed: bound `max_shortening`, or" in repr(found)
+    assert found.completeness.upper == np.inf
+    within = [bar.max_shortening <= 0.5]
+    assert em.find_equilibria(bar, {"F": 0.4}, within=within).completeness.upper < np.inf
+    end = em.lift(bar.natural_state(), {"F": 5.0}).end
+    assert end.detail.endswith("where a bar has collapsed: bound `max_shortening`")
 
 
 @pytest.mark.parametrize("load", ["uniform", "left-half"])

@@ -6,6 +6,7 @@ import numpy as np
 from scipy.special import gammaln, xlogy
 
 from equimorph.arrays import Bool
+from equimorph.structures import Structure
 
 CONFIDENCE = 0.95
 """Confidence level of the bound on the probability that one more run finds a new equilibrium."""
@@ -27,6 +28,8 @@ class Completeness:
     unresolved
         Starts that led to states which the discretisation does not resolve, and which may obey the
         constraints; all of them if nothing was found.
+    cause
+        What is told of such states, and what helps; see `Structure.unresolved`.
     starts, arrived
         Random guesses of all runs, and those of them that led to a state that counts: where few
         arrive, the runs share their luck, and the estimates mean little.
@@ -40,6 +43,7 @@ class Completeness:
     unresolved: int = 0
     starts: int = 0
     arrived: int = 0
+    cause: str = Structure.unresolved
 
     @property
     def runs(self) -> int:
@@ -110,9 +114,8 @@ class Completeness:
         found = f"{self.found} found" + (f" (in single runs {runs})" if self.found else "")
         if self.unresolved:
             return (
-                f"{found}; there may be any number more, as {self.unresolved} starts led to states "
-                "that the discretisation does not resolve: refine it, or exclude them by a "
-                "constraint"
+                f"{found}; there may be any number more, as {self.unresolved} starts led to where "
+                f"{self.cause}, or exclude such states by a constraint"
             )
         return (
             f"{found}; estimated {self.estimate:.1f}, at most {self.upper:.0f} (95 %) if all are "

@@ -34,7 +34,6 @@ WHY = {
     kernels.LONG: "no end in {most} steps",
     kernels.STUCK: "the start is singular: it lies on a fold or a branch point",
 }
-UNRESOLVED = "the discretisation does not resolve the state: refine it"
 
 
 @dataclass(frozen=True)
@@ -248,7 +247,7 @@ class Block:
                 continue
             state = self.curve.take(rows.lanes[[i]]).states(front.z, front.t)
             if not self.curve.structure.resolved(*state)[0]:
-                why = f"{why}, where {UNRESOLVED}"
+                why = f"{why}, where {self.curve.structure.unresolved}"
             length = float(rows.numbers[kernels.TRAVELLED, i])
             lost.append(Loss(int(rows.lanes[i]), why, front, length))
         return lost

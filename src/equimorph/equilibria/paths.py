@@ -18,7 +18,6 @@ from equimorph.equilibria.hidden_events import (
 )
 from equimorph.equilibria.legs import Leg, Prepared, legs_of, prepare_leg
 from equimorph.equilibria.locate import locate_root
-from equimorph.equilibria.march import UNRESOLVED
 from equimorph.equilibria.steps import Bracket, Points
 from equimorph.equilibria.trace import Traces, trace
 from equimorph.equilibria.trace_options import EventCode, EventKind, TraceOptions
@@ -334,7 +333,7 @@ def _end(curve: Curve, outcome: Traces, number: int, within: tuple[Constraint, .
         critical = criticality(curve, z, t)[0]
         detail = critical
     if code != EventCode.LOST and not detail and not state.resolved:
-        detail = UNRESOLVED
+        detail = curve.structure.unresolved
     return Event(kind, state, number + float(t[0]), critical, detail)
 
 

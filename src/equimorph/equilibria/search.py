@@ -327,7 +327,8 @@ class _Catch:
         structure, z = self.ground.structure, self.z[self.kept]
         reasons = (UNRESOLVED,) if len(z) else (UNRESOLVED, BEYOND)
         unresolved = sum(self.failures.get(reason, 0) for reason in reasons)
-        completeness = Completeness(self.captured, unresolved, self.starts, self.arrived)
+        arrivals = self.starts, self.arrived
+        completeness = Completeness(self.captured, unresolved, *arrivals, structure.unresolved)
         dropped = self.unresolved[distinct(structure, self.unresolved)]
         p, there = (np.tile(self.ground.p, (len(each), 1)) for each in (z, dropped))
         beside = States(structure, dropped, there)

@@ -116,6 +116,8 @@ class Structure(Rebuilt, Inertial):
     """Unit of the coordinates to draw."""
     upward: ClassVar[str] = "y"
     """Axis, y or z, that is upward in pictures of a structure in space."""
+    unresolved: str = "the discretisation does not resolve the state: refine it"
+    """What is told where states are not `resolved`, and what helps there."""
     energy_scale: float = 1.0
     """Value of one unit of `energy` in the units of the parameters, in joules for example."""
 

@@ -124,6 +124,7 @@ class EnergyStructure(DiscreteStructure):
     """
 
     kind: ClassVar[str] = "energy"
+    unresolved = "an unknown is beyond its limits: bound its descriptor"
 
     @check_arguments
     def __init__(  # noqa: PLR0913  # what an energy can have
@@ -262,8 +263,7 @@ class EnergyStructure(DiscreteStructure):
 
     def growth(self, p: Float[np.ndarray, " parameters"]) -> Growth:
         """Whether the energy grows at infinity: shown for polynomials, or promised."""
-        given = self._unknowns, self.constraints, self._coercive
-        return growth_of(self._graphs.energy, *given, p)
+        return growth_of(self._graphs.energy, self._unknowns, self.constraints, self._coercive, p)
 
     # --- states ---------------------------------------------------------------------------------
 

@@ -51,6 +51,7 @@ class TrussMechanics(AnyNetwork):
 
     kind: ClassVar[str] = "truss"
     upward: ClassVar[str] = "z"
+    unresolved = "a bar has collapsed: bound `max_shortening`"
     constraints = 0
     network: TrussNetwork
 
