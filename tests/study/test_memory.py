@@ -71,6 +71,7 @@ def test_the_largest_need_counts_and_may_just_be_met(monkeypatch: pytest.MonkeyP
 SET = """
 import ctypes, gc, re, sys
 from pathlib import Path
+from threading import Event, Thread
 from equimorph.manifold import equilibrium_set
 from equimorph.model import Box
 from equimorph.structures import Rod
@@ -82,17 +83,22 @@ def build(ranges, intervals):
     box = Box(**dict(list(ranges.items())[:d]))
     equilibrium_set(arch, box, fixed=fixed, within=[arch.max_curvature <= 20],
                     intervals=intervals, checks=0)
-def resident(which):
-    found = re.search(which + r":\\s+(\\d+) kB", Path("/proc/self/status").read_text())
+def resident():
+    found = re.search(r"RssAnon:\\s+(\\d+) kB", Path("/proc/self/status").read_text())
     return 1024 * int(found[1])
 build(small, (3,) * d)
-# what the small set took is given back, and its peak forgotten
 gc.collect()
 ctypes.CDLL(None).malloc_trim(0)
-Path("/proc/self/clear_refs").write_text("5")
-before = resident("VmRSS")
+before, seen, ended = resident(), [], Event()
+def watch():
+    while not ended.wait(0.005):
+        seen.append(resident())
+watcher = Thread(target=watch)
+watcher.start()
 build(whole, tuple(map(int, sys.argv[2:])))
-print(resident("VmHWM") - before)
+ended.set()
+watcher.join()
+print(max(seen) - before)
 """
 
 
@@ -101,7 +107,8 @@ print(resident("VmHWM") - before)
 def test_the_estimate_for_sets_over_one_and_three_parameters(intervals: tuple[int, ...]):
     """The set alone, beyond what the program takes with a small one.
 
-    The smaller of two: the first may compile a kernel.
+    Pages of files do not count, which the system may take back at any time; the smaller of two
+    runs: the first may compile a kernel.
     """
     words = [sys.executable, "-c", SET, str(len(intervals)), *map(str, intervals)]
     runs = [subprocess.run(words, capture_output=True, text=True, check=True) for _ in range(2)]
