@@ -142,8 +142,9 @@ def nearest_pairs(
     guess: Float[np.ndarray, "guesses size"],
     pairs: Int[np.ndarray, "2 pairs"],
     group: Int[np.ndarray, " pairs"],
+    most: int,
 ) -> Int[np.ndarray, " chosen"]:
-    """Of pairs of states and guesses, in sorted groups, those nearest to each other.
+    """Of pairs of states and guesses, in sorted groups, the ones nearest to each other of each.
 
     `pairs` has the numbers of the state and the guess of each. Some are compared at a time, because
     of thousands of states of many unknowns the copies would be longer to write than to compare.
@@ -154,7 +155,7 @@ def nearest_pairs(
         gap[at : at + COMPARED] = metric_length(structure, z[state] - guess[number])
     order = np.lexsort((gap, group))
     rank = np.arange(len(order)) - np.searchsorted(group, group[order])
-    return np.sort(order[rank < NEAREST])
+    return np.sort(order[rank < most])
 
 
 def root_weights(

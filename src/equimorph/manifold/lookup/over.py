@@ -28,6 +28,7 @@ from equimorph.manifold.geometry.topology import Adjacency, senses
 from equimorph.manifold.lookup.cell_index import NUDGE, CellIndex, Hits
 from equimorph.manifold.lookup.exact_states import (
     CLOSEST,
+    NEAREST,
     Found,
     Points,
     exact_states,
@@ -145,20 +146,15 @@ class Sheets:
     def holding(self, states: States) -> tuple[Flags, Numbers]:
         """Which states are among those over their own points; their cells, −1 if not known.
 
-        The cells whose guesses are nearest to a state are tried first; only for what is not found
-        so all states over the point are asked for, once for all that lie over it.
+        The cell whose guess is nearest to a state is tried first, then the next ones; only for what
+        is not found so all states over the point are asked for, once for all that lie over it.
         """
         z, p = states.z, states.p
-        near = self._near(p[:, self.free])
-        guess = self._guess(near)
-        pairs = np.stack([near.point, np.arange(len(near))])
-        some = nearest_pairs(self.structure, z, guess, pairs, near.point)
-        found, good, index = exact_states(self.structure, guess[some], p[near.point[some]])
-        good &= index == self.cell_index[near.cell[some]]
-        good &= self._are_same(z[near.point[some]], found)
-        known, cell = np.zeros(len(z), bool), np.full(len(z), -1)
-        of_good = some[good]
-        known[near.point[of_good]], cell[near.point[of_good]] = True, near.cell[of_good]
+        near, known, cell = self._near(p[:, self.free]), np.zeros(len(z), bool), np.full(len(z), -1)
+        for most in (1, NEAREST):
+            near = near.take(~known[near.point])
+            good = near.take(self._on_nearest(z, p, near, most))
+            known[good.point], cell[good.point] = True, good.cell
         rest = np.flatnonzero(~known)
         if len(rest):
             places, place = np.unique(p[rest], axis=0, return_inverse=True)
@@ -169,6 +165,15 @@ class Sheets:
             same = np.flatnonzero(self._are_same(z[mine], over.z[theirs]))
             known[mine[same]], cell[mine[same]] = True, of_over[theirs[same]]
         return known, cell
+
+    def _on_nearest(self, z: Lanes, p: Points, near: Hits, most: int) -> Some:
+        """Those of the cells near states, the nearest ones of each, that lead to the states."""
+        guess, pairs = self._guess(near), np.stack([near.point, np.arange(len(near))])
+        some = nearest_pairs(self.structure, z, guess, pairs, near.point, most)
+        own = near.point[some]
+        found, good, index = exact_states(self.structure, guess[some], p[own])
+        good &= index == self.cell_index[near.cell[some]]
+        return np.asarray(some[good & self._are_same(z[own], found)])
 
     def _are_same(self, z: Lanes, other: Lanes) -> Flags:
         return np.asarray(metric_length(self.structure, z - other) <= SAME_SOLUTION)
@@ -360,8 +365,8 @@ class Sheets:
         first, last = (np.searchsorted(point, near.point[hit], side) for side in ("left", "right"))
         number = np.repeat(np.arange(len(hit)), last - first)
         state = np.concatenate([np.zeros(0, int), *map(np.arange, first, last)])
-        guess = self._guess(near)[hit]
-        nearest = nearest_pairs(self.structure, z, guess, np.stack([state, number]), number)
+        guess, pairs = self._guess(near)[hit], np.stack([state, number])
+        nearest = nearest_pairs(self.structure, z, guess, pairs, number, NEAREST)
         number, state = number[nearest], state[nearest]
         velocity = np.zeros((len(state), p.shape[1]))
         velocity[:, self.free] = way[number]
