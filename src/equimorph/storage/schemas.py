@@ -63,7 +63,7 @@ class Change:
 
 CHANGES: Mapping[str, Change] = {
     "Audit": Change(version=9),
-    "Completeness": Change(version=2),  # older ones do not count their starts
+    "Completeness": Change(version=3),  # older ones neither count starts nor say what helps
     "LeastSnap": Change(version=2),
     "Proof": Change(version=3, removed=("status",)),  # it follows from `why` and `bounds`
     "RobustOptimum": Change(version=2),  # older ones have no number of exchanges
