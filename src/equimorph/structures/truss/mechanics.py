@@ -199,11 +199,16 @@ class TrussMechanics(AnyNetwork):
 
         A shallow dome of 24 bars has a hundred states near where it was built, to which none of
         1000 larger guesses led; with every second one small, rows of bistable bars lose states.
+        Others are places anywhere in the `region` of the joints: no displacement within its own
+        size turns a bar over that is held at one end.
         """
         extent = np.ptp(self.network.places, axis=0)
         reach = np.broadcast_to(np.maximum(extent, 0.2 * extent.max()), self.network.held.shape)
         shape = (len(p), self.unknowns)
-        guesses = generator.uniform(-1.0, 1.0, shape) * reach[~self.network.held]
+        random, free = generator.uniform(-1.0, 1.0, shape), ~self.network.held
+        guesses = random * reach[free]
+        middle, width = (each[free] for each in self.network.region)
+        guesses[1::4] = middle - self.network.places[free] + random[1::4] * width
         guesses[3::4] *= SMALLEST ** generator.uniform(0.0, 1.0, (len(guesses[3::4]), 1))
         guesses[3:4] = 0.0  # as it was built
         return np.asarray(guesses)

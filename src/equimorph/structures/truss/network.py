@@ -6,6 +6,7 @@ from functools import cached_property
 from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
+from scipy.sparse.csgraph import csgraph_from_dense, dijkstra
 
 from equimorph.argument_checks import check_arguments
 from equimorph.argument_notes import TWO_NAMES
@@ -159,6 +160,21 @@ class TrussNetwork(Network):
         drawn = np.linalg.norm(self.chords, axis=1).tolist()
         pairs = zip(self.members, drawn, strict=True)
         return np.array([chord if bar.rest is None else float(bar.rest) for bar, chord in pairs])
+
+    @cached_property
+    def region(self) -> tuple[Float[np.ndarray, "joints space"], Float[np.ndarray, "joints space"]]:
+        """Where bars without stress let joints be: the middle and half width along each axis.
+
+        As far from the nearest support that holds the axis as the bars on the way are long.
+        """
+        bars = np.full((len(self.joints), len(self.joints)), np.inf)
+        np.minimum.at(bars, tuple(self.ends.T), self.lengths)
+        graph = csgraph_from_dense(bars, null_value=np.inf)
+        middle, width = self.places.copy(), np.zeros(self.held.shape)
+        for axis, held in enumerate(self.held.T):
+            far, _, support = dijkstra(graph, False, np.flatnonzero(held), True, min_only=True)
+            middle[:, axis], width[:, axis] = self.places[support, axis], far
+        return middle, width
 
     def supports_data(self) -> list[str]:
         """Held axes of the joints."""
