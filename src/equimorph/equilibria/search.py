@@ -6,18 +6,19 @@ See docs/decisions.md, "Searches follow lines through known equilibria".
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from equimorph.argument_checks import check_arguments
-from equimorph.arrays import Bool, Float, Int, Lanes, Numbers
+from equimorph.arrays import Bool, Flags, Float, Int, Lanes, Numbers
 from equimorph.equilibria.capture import Completeness
 from equimorph.equilibria.gradient_flow import QUICK, Pace
 from equimorph.equilibria.legs import check_isolated
 from equimorph.equilibria.minima_graph import Argument, MinimaGraph, arguments_of, contradicts
 from equimorph.equilibria.random_search import BEYOND, UNRESOLVED, Ground, Pools, distinct
 from equimorph.errors import InputError
-from equimorph.model import Constraint, parameter_vector
+from equimorph.model import Constraint, are_feasible, parameter_vector
 from equimorph.structures import States, Structure
 from equimorph.structures.metric import metric_length
 
@@ -51,17 +52,24 @@ class FoundStates(States):
         whose neighbours of index one are all missing with it escapes them.
     unresolved
         Different states, which may obey the constraints, that the discretisation does not resolve.
+    invalid
+        Different states that were met beyond `Structure.validity`, where the energy does not
+        describe the structure. They are not counted.
     """
 
     completeness: Completeness
     failures: Mapping[str, int]
     arguments: tuple[Argument, ...] = ()
     unresolved: States | None = None
+    invalid: States | None = None
 
     def __repr__(self) -> str:
         """How many, how many of them are stable, and how many there may be."""
         stable, kind = int((self.index == 0).sum()), self.structure.kind
         told = "".join(f"; {each.name}: {each.standing}" for each in self.arguments)
+        if self.invalid:
+            bounds = ", ".join(map(str, self.structure.validity))
+            told = f"; {len(self.invalid)} more, not counted, violate {bounds}{told}"
         return (
             f"FoundStates({kind}: {len(self)}, {stable} of them stable; {self.completeness}{told})"
         )
@@ -85,9 +93,9 @@ def find_equilibria(
     equilibrium and followed both ways through folds: where they return to `at` they give further
     ones, through which lines are laid again, until nothing new comes. Images under symmetries that
     leave `at` unchanged belong to each run. States that the discretisation does not resolve, or
-    that violate `within`, are dropped. States that differ by whole turns of what nothing keeps from
-    turning, like a rod between pins, are one. While only one run found some equilibrium, runs are
-    added.
+    that violate `within` or `Structure.validity`, are dropped. States that differ by whole turns of
+    what nothing keeps from turning, like a rod between pins, are one. While only one run found some
+    equilibrium, runs are added.
 
     Then the energy is followed downwards from every state of index one until that leads to nothing
     new, and saddles are searched between minima that no chain of saddles joins: so no stable state
@@ -287,10 +295,24 @@ class _Catch:
         run = np.concatenate([self.run, np.full(len(z), NO_RUN)])
         return replace(self, z=np.concatenate([self.z, z]), run=run)
 
-    @property
+    @cached_property
     def valid(self) -> Int[np.ndarray, " valid"]:
-        """What obeys the constraints."""
-        return np.flatnonzero(self.ground.excess(self.z, np.zeros(len(self.z), int)) <= 0.0)
+        """What obeys the constraints, and is described by the energy."""
+        return np.flatnonzero(self._obeying & self._described)
+
+    @property
+    def invalid(self) -> Int[np.ndarray, " beyond"]:
+        """What obeys the constraints, but is not described by the energy."""
+        return np.flatnonzero(self._obeying & ~self._described)
+
+    @cached_property
+    def _obeying(self) -> Flags:
+        return np.asarray(self.ground.excess(self.z, np.zeros(len(self.z), int)) <= 0.0)
+
+    @cached_property
+    def _described(self) -> Flags:
+        p = np.tile(self.ground.p, (len(self.z), 1))
+        return are_feasible(self.ground.structure.validity, self.z, p)
 
     @property
     def kept(self) -> Int[np.ndarray, " found"]:
@@ -329,7 +351,10 @@ class _Catch:
         unresolved = sum(self.failures.get(reason, 0) for reason in reasons)
         arrivals = self.starts, self.arrived
         completeness = Completeness(self.captured, unresolved, *arrivals, structure.unresolved)
-        dropped = self.unresolved[distinct(structure, self.unresolved)]
-        p, there = (np.tile(self.ground.p, (len(each), 1)) for each in (z, dropped))
-        beside = States(structure, dropped, there)
-        return FoundStates(structure, z, p, completeness, self.failures, arguments, beside)
+        p = np.tile(self.ground.p, (len(z), 1))
+        beside = (
+            States(structure, each, np.tile(self.ground.p, (len(each), 1)))
+            for every in (self.unresolved, self.z[self.invalid])
+            for each in [every[distinct(structure, every)]]
+        )
+        return FoundStates(structure, z, p, completeness, self.failures, arguments, *beside)

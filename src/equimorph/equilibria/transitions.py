@@ -20,7 +20,7 @@ from equimorph.equilibria.minima_graph import NONE, Argument, arguments_of
 from equimorph.equilibria.saddles import Nowhere, ways_over
 from equimorph.equilibria.search import search_with_graph
 from equimorph.errors import InputError
-from equimorph.model import Constraint, parameter_vector
+from equimorph.model import Constraint, are_feasible, parameter_vector
 from equimorph.structures import State, States, Structure, join_states
 from equimorph.structures.metric import metric_length
 from equimorph.tolerances import SAME_PLACE, SAME_SOLUTION
@@ -52,7 +52,7 @@ class TransitionNetwork:
         Numbers of the states where the two descents of each end, along ± the unstable mode;
         negative where they end at none, see `Nowhere`.
     admissible
-        Whether each state obeys the constraints.
+        Whether each state obeys the constraints, and those of `Structure.validity`.
     completeness, arguments
         What `find_equilibria` says of states that may be missing.
     """
@@ -262,7 +262,7 @@ def transition_network(
         States(structure, graph.z[order], p),
         saddles,
         np.array([ends[saddle] for saddle in saddles.tolist()], int).reshape(-1, 2),
-        graph.ground.excess(graph.z[order], graph.group) <= 0.0,
+        are_feasible((*within, *structure.validity), graph.z[order], p),
         found.completeness,
         arguments_of(graph, 0),
     )

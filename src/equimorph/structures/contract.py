@@ -253,7 +253,7 @@ class Structure(Rebuilt, Inertial):
     def validity(self) -> tuple[Constraint, ...]:
         """Constraints beyond which the energy does not describe the structure; none by default.
 
-        Sets end there as at constraints that are asked for.
+        Sets end there as at constraints that are asked for, and searches count no states beyond.
         """
         return ()
 
