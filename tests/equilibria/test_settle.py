@@ -1,5 +1,7 @@
 """The corrector for points with conditions, on forms known in closed form."""
 
+import sys
+
 import numpy as np
 import pytest
 
@@ -307,6 +309,30 @@ def test_a_lane_that_fails_leaves_the_others_as_they_are():
         mine = [Fold(), held(form, z[own], p[own], 0)]
         alone = settle(form, z[own], p[own], directions[own], mine)
         assert np.allclose(alone.z, whole.z[own], rtol=0, atol=1e-13)
+
+
+def test_batches_do_not_change_results(monkeypatch):
+    """Lanes of which some fail, on folds and pushed away from known solutions, eight at a time."""
+    form, lanes = pitchfork_form(1.0), 43
+    generator = np.random.default_rng(5)
+    z, p = generator.normal(size=(lanes, 1)), generator.normal(size=(lanes, 2))
+    directions = free_directions(form, np.array([0, 1]), lanes)
+    guards = Guards(iterations=8, too_long=generator.uniform(1.0, 9.0, lanes))
+    pushed = Guards(iterations=8, known=generator.normal(size=(lanes, 2, 1)))
+
+    def both():
+        conditions = [Fold(), held(form, z, p, 0)]
+        return [settle(form, z, p, directions, conditions, guards),
+                settle(form, z, p, None, (), pushed)]  # fmt: skip
+
+    whole = both()
+    module = sys.modules[settle.__module__]
+    monkeypatch.setattr(module, "BATCH", 1)
+    monkeypatch.setattr(module, "FEWEST", 8)
+    for one, other in zip(whole, both(), strict=True):
+        assert 0 < one.found.sum() < lanes
+        for name, values in vars(one).items():
+            np.testing.assert_allclose(getattr(other, name), values, 1e-9, 1e-9, err_msg=name)
 
 
 def test_no_lanes_are_no_trouble():

@@ -8,7 +8,7 @@ import pytest
 
 import equimorph as em
 from equimorph.manifold.geometry.quadratics import least_in_simplex, monomials, through_corners
-from equimorph.manifold.lifting import completeness, seeds
+from equimorph.manifold.lifting import completeness, hidden_islands, seeds
 from equimorph.manifold.lifting.grid import bisect, grid_lines, grid_mesh, split_at
 from sets import blind
 from typecheck import unchecked
@@ -235,3 +235,21 @@ def test_islands_are_found_by_determinants_beyond_the_range_of_numbers(kind, mon
     found = island(0, kind)
     np.testing.assert_array_equal(found.points.z, known.points.z)
     np.testing.assert_array_equal(found.cells, known.cells)
+
+
+def test_cells_without_an_island_are_not_searched_again(monkeypatch):
+    """States with the other index, here on parts that cells cut off, are found each time."""
+    eset, counts, inside = island(9, "lips"), [], hidden_islands._inside
+
+    def counted(setting, patches, *given):
+        counts.append(len(patches.unit))
+        return inside(setting, patches, *given)
+
+    monkeypatch.setattr(hidden_islands, "_inside", counted)
+    finder = hidden_islands.IslandFinder()
+    first, searched = finder.find(eset), counts[0]
+    counts.clear()
+    again = finder.find(eset)
+    assert len(first) > 0
+    np.testing.assert_array_equal(first.z, again.z)
+    assert 0 < counts[0] < searched / 2

@@ -26,6 +26,7 @@ from equimorph.arrays import (
     Some,
     Values,
 )
+from equimorph.columns import Columns
 from equimorph.equilibria.newton_kernels import judge_lanes
 from equimorph.equilibria.newton_step import (
     Frame,
@@ -41,6 +42,7 @@ from equimorph.equilibria.newton_step import (
 )
 from equimorph.equilibria.onto_set import settle_onto
 from equimorph.equilibria.point_conditions import Condition
+from equimorph.linalg.lanes import SMALLEST_SHARE
 from equimorph.model import Constraint
 from equimorph.structures import Equations, Structure, newton_kernels
 from equimorph.structures.margin import count_below
@@ -66,6 +68,14 @@ SMALL_EIGENVALUE = 1e-6
 """Size below which an eigenvalue at a fold is the one that vanishes."""
 SLACK = 1e-9
 """By how much points may exceed constraints."""
+BATCH = 2**18
+"""Unknowns of the lanes that are corrected together: more would leave the caches, and their arrays
+go back to the system after each step."""
+FEWEST = 2 * SMALLEST_SHARE
+"""Lanes that are corrected together in any case, for two threads."""
+
+
+Known = Float[np.ndarray, "lanes roots unknowns"] | None
 
 
 class Status(IntEnum):
@@ -111,7 +121,7 @@ class Guards(Limits):
         Constraints that the point must obey.
     """
 
-    known: Float[np.ndarray, "lanes roots unknowns"] | None = None
+    known: Known = None
     trust: Values | None = None
     middle: tuple[Lanes, Parameters] | None = None
     lower_index: Numbers | None = None
@@ -120,7 +130,7 @@ class Guards(Limits):
 
 
 @dataclass(frozen=True)
-class Settled:
+class Settled(Columns):
     """Points with conditions, and how sure they are.
 
     Parameters
@@ -210,7 +220,8 @@ def settle(
         told, sure = settle_onto(problem, z, p, guards)
         settled = _as_settled(told, sure, frames=frames)
         return _apply_guards(structure, settled, z, p, guards)
-    return _apply_guards(structure, _by_steps(problem, z, p, guards, frames=frames), z, p, guards)
+    settled = _by_steps(problem, z, p, guards, guards.known, frames=frames)
+    return _apply_guards(structure, settled, z, p, guards)
 
 
 def _in_one_plane(problem: Problem, z: Lanes, p: Parameters, guards: Guards) -> Settled:
@@ -237,11 +248,25 @@ def _as_settled(found: Newton, sure: Flags | None = None, *, frames: bool = True
 
 
 def _by_steps(
-    problem: Problem, z: Lanes, p: Parameters, guards: Guards, *, frames: bool = True
+    problem: Problem,
+    z: Lanes,
+    p: Parameters,
+    limits: Limits,
+    known: Known = None,
+    *,
+    frames: bool = True,
 ) -> Settled:
-    """Newton's method for any directions and conditions."""
+    """Newton's method for any directions and conditions, in batches of lanes."""
+    lanes, most = len(z), max(FEWEST, BATCH // z.shape[1])
+    if lanes > most:
+        parts = []
+        for some in np.split(np.arange(lanes), range(most, lanes, most)):
+            own = None if known is None else known[some]
+            given = problem.take(some), z[some], p[some], limits.take(some), own
+            parts.append(_by_steps(*given, frames=frames))
+        return Settled.concatenate(parts)
     here = start_at(problem, z, p)
-    run = _Run(here, guards, frames=frames)
+    run = _Run(here, limits, known, frames=frames)
     while len(run.lanes):
         step = here.step()  # onto the set, and along it to the conditions
         status, share = run.judge(here, step)
@@ -260,15 +285,15 @@ def embedded_planes(structure: Structure, free: Int[np.ndarray, " d"], rows: Row
 class _Run:
     """The lanes that are still on their way, and what became of the others."""
 
-    def __init__(self, here: Points, guards: Guards, *, frames: bool) -> None:
+    def __init__(self, here: Points, limits: Limits, known: Known, *, frames: bool) -> None:
         """Begin with all lanes."""
         count, width = len(here.z), here.problem.width
-        self.lanes, self.guards, self.number = np.arange(count), guards, 0
+        self.lanes, self.limits, self.number = np.arange(count), limits, 0
         self.size, self.first = np.full(count, np.inf), np.full(count, np.inf)
-        self.known = guards.known
+        self.known = known
         structure, bordered = here.problem.structure, here.z.shape[1] + width
-        self.weights = weights_of(structure, bordered, guards.multipliers)
-        self.too_long = guards.too_long_of(count)
+        self.weights = weights_of(structure, bordered, limits.multipliers)
+        self.too_long = limits.too_long_of(count)
         self.z, self.p, self.beta = here.z.copy(), here.p.copy(), here.beta.copy()
         self.status = np.full(count, OPEN)
         self.index, self.sure = np.full(count, -1), np.zeros(count, bool)
@@ -277,14 +302,14 @@ class _Run:
 
     def judge(self, here: Points, step: Step) -> tuple[Numbers, Values]:
         """Status of each lane after a step, and the share of the step that is taken."""
-        guards, lanes = self.guards, self.lanes
+        limits, lanes = self.limits, self.lanes
         size, share, status = np.empty(len(lanes)), np.empty(len(lanes)), np.empty(len(lanes), int)
         factor = _lengthening(here, step, self.known)
         self.number += 1
-        free = guards.contraction == np.inf or self.number <= guards.free
-        rule = (free, self.number >= guards.iterations)
-        limits = (guards.lengths, self.too_long[lanes], float(guards.longest))
-        given = (step.change, self.weights, factor, self.size[lanes], *limits, rule)
+        free = limits.contraction == np.inf or self.number <= limits.free
+        rule = (free, self.number >= limits.iterations)
+        lengths = (limits.lengths, self.too_long[lanes], float(limits.longest))
+        given = (step.change, self.weights, factor, self.size[lanes], *lengths, rule)
         judge_lanes(*given, size, status, share)
         self.size[lanes] = size
         if self.number == 1:
@@ -316,9 +341,7 @@ class _Run:
         return Settled(self.z, self.p, self.status, self.size, self.first, *told)
 
 
-def _lengthening(
-    here: Points, step: Step, known: Float[np.ndarray, "lanes roots unknowns"] | None
-) -> Values:
+def _lengthening(here: Points, step: Step, known: Known) -> Values:
     """Factor of Newton steps for m(u) F = 0 with m = Π (1 + 1/‖u − uᵢ‖²), uᵢ known solutions.
 
     The Newton step of the product is that of F, lengthened by 1/(1 − ∇(log m)·du)

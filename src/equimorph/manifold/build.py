@@ -25,6 +25,7 @@ from equimorph.manifold.lifting.grid import (
     grid_mesh,
     longest_edges,
 )
+from equimorph.manifold.lifting.hidden_islands import IslandFinder
 from equimorph.manifold.lifting.layers import find_through_layers
 from equimorph.manifold.lifting.pairing import Pairing, start_pairing
 from equimorph.manifold.lifting.seeds import Seeds, is_symmetric, seeds
@@ -226,13 +227,14 @@ def _complete(
     """Cells and set, with what the completeness checks find that it lacks."""
     pairing, order, effort = lifting.pairing, lifting.order, lifting.order.effort
     generator = np.random.default_rng([effort.seed, 1])
-    recovered = 0
+    recovered, islands = 0, IslandFinder()
     for number in range(SEARCHES):
         # what stays undecided in spite of bisection is not mended by more equilibria
         if pairing.is_full or lifting.given_up:
             found = Check(0, eset.points[:0])
             break
-        found = check(eset, generator, _checks(effort.checks, order.setting), order.progress)
+        points = _checks(effort.checks, order.setting)
+        found = check(eset, generator, points, islands, order.progress)
         lacking = len(found.missing)
         if lacking == 0 or number == SEARCHES - 1:
             break

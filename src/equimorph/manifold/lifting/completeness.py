@@ -19,7 +19,7 @@ from equimorph.manifold.geometry.setting import Setting
 from equimorph.manifold.geometry.simplices import volumes
 from equimorph.manifold.lifting.descents_of_set import descents_of_set, spread_over_strata
 from equimorph.manifold.lifting.grid import bisect, split_at
-from equimorph.manifold.lifting.hidden_islands import hidden_islands
+from equimorph.manifold.lifting.hidden_islands import IslandFinder
 from equimorph.manifold.lifting.pairing import Pairing
 from equimorph.manifold.lifting.parted_pieces import between_pieces
 from equimorph.manifold.lifting.seeds import Seeds, polish
@@ -79,6 +79,7 @@ def check(
     eset: EquilibriumSet,
     generator: np.random.Generator,
     points: int,
+    islands: IslandFinder,
     progress: Progress,
 ) -> Check:
     """Search at random points, half of them anywhere in the box, half below the set.
@@ -99,7 +100,7 @@ def check(
     if not places:
         return Check(0, eset.points[:0])
     seed, first = int(generator.integers(2**31)), max(FIRST, points // FIRST_OF)
-    found = _searched(eset, places[:first], seed).joined(_elsewhere(eset, seed))
+    found = _searched(eset, places[:first], seed).joined(_elsewhere(eset, seed, islands))
     if len(found.missing) or len(places) <= first:
         return found
     progress.report("independent checks", first, points)
@@ -129,7 +130,7 @@ def _searched(eset: EquilibriumSet, places: list[dict[str, float]], seed: int) -
     return Check(met, lacking, left_out=left_out, starts=starts, arrived=arrived)
 
 
-def _elsewhere(eset: EquilibriumSet, seed: int) -> Check:
+def _elsewhere(eset: EquilibriumSet, seed: int, islands: IslandFinder) -> Check:
     """What guesses over their own points, sides, descents, lines and images lead to."""
     scattered = _scattered(eset, SCATTERED, np.random.default_rng(seed))
     resolved = scattered.resolved
@@ -138,7 +139,7 @@ def _elsewhere(eset: EquilibriumSet, seed: int) -> Check:
     begun = len(pools.ground.p)
     met = _within(pools, pools.z[begun:], pools.group[begun:])
     structure = eset.structure
-    beside = _belonging(eset, join_states(structure, [hidden_islands(eset), _mirrored(eset)]))
+    beside = _belonging(eset, join_states(structure, [islands.find(eset), _mirrored(eset)]))
     found = scattered[np.flatnonzero(resolved)]
     told = (found, led.landed, met, beside)
     entering = in_sides[np.flatnonzero(in_sides.resolved)]

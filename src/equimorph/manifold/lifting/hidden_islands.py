@@ -14,7 +14,7 @@ from itertools import combinations
 
 import numpy as np
 
-from equimorph.arrays import Cells, Float, ItemValues
+from equimorph.arrays import Cells, Float, Int, ItemValues
 from equimorph.columns import Columns
 from equimorph.equilibria.determinants import determinants
 from equimorph.equilibria.settle import Guards, free_directions, settle
@@ -27,7 +27,8 @@ from equimorph.manifold.geometry.topology import Adjacency
 from equimorph.structures import States, join_states
 
 DEEP = 0.5
-"""Share of the least determinant at the corners of a simplex below which its minimum is sought."""
+"""Share of the least determinant met so far below which its minimum is sought: a minimum that is
+no island is left as soon as it is met."""
 VARYING = 2.0
 """Ratio of the largest determinant around a cell to the least one at its corners below which it
 cannot dip inside."""
@@ -61,28 +62,52 @@ class _Patches(Columns):
     determinants: Float[np.ndarray, "n points"]
 
 
-def hidden_islands(eset: EquilibriumSet) -> States:
-    """Equilibria inside cells of a set that have not the index of these: one in each grid cell."""
-    setting, d = eset.setting, len(eset.names)
-    empty = eset.points[:0]
-    if d == 1 or len(eset.cells) == 0:  # edges are traced, and have no inside besides
-        return empty
-    patches, size, found = _of_cells(eset), 1.0, [empty]
-    least, centres, _ = _models(setting, patches)
-    guesses = centres
+class IslandFinder:
+    """Finds islands inside cells of sets of the same structure.
+
+    Cells in which none was found are not searched again while their patches stay as they are.
+    """
+
+    def __init__(self) -> None:
+        """No cell was searched yet."""
+        self._without: set[bytes] = set()
+
+    def find(self, eset: EquilibriumSet) -> States:
+        """Equilibria inside cells that have not the index of these: one in each grid cell."""
+        setting, d = eset.setting, len(eset.names)
+        if d == 1 or len(eset.cells) == 0:  # edges are traced, and have no inside besides
+            return eset.points[:0]
+        patches = _of_cells(eset)
+        least, centres, _ = _models(setting, patches)
+        names = [each.tobytes() for each in patches.z]
+        known = np.array([name in self._without for name in names], bool)
+        deep = np.flatnonzero((least < patches.deep) & ~known)
+        found, origin = _zoom(setting, patches.take(deep), centres[deep])
+        self._without.update(names[number] for number in np.delete(deep, origin))
+        cells = [eset.mesh.locate(place) for place in found.p[:, setting.free]]
+        return found[np.unique(cells, return_index=True)[1]]
+
+
+def _zoom(
+    setting: Setting, patches: _Patches, centres: Shares
+) -> tuple[States, Int[np.ndarray, " found"]]:
+    """States of the other index near places in patches, and the number of the patch of each."""
+    number, guesses, size = np.arange(len(centres)), centres, 1.0
+    found, origin = [States(setting.structure, patches.z[:0, 0], patches.p[:0, 0])], [number[:0]]
     for _ in range(ZOOMS):
-        deep = np.flatnonzero(least < patches.deep)
-        if len(deep) == 0:
+        if len(number) == 0:
             break
-        patches = _inside(setting, patches.take(deep), centres[deep], guesses[deep], size)
+        patches = _inside(setting, patches, centres, guesses, size)
         other = np.asarray((patches.determinants < 0.0).any(axis=1))
         found.append(_deepest(setting, patches.take(other)))
-        whole = np.isfinite(patches.determinants[:, : d + 1]).all(axis=1)
-        patches, size = patches.take(whole & ~other), NARROWER
-        least, centres, guesses = _lowest(setting, patches)
-    states = join_states(setting.structure, found)
-    cells = [eset.mesh.locate(place) for place in states.p[:, setting.free]]
-    return states[np.unique(cells, return_index=True)[1]]
+        origin.append(number[other])
+        whole = np.isfinite(patches.determinants[:, : len(setting.free) + 1]).all(axis=1)
+        left, size = np.flatnonzero(whole & ~other), NARROWER
+        least, centres, guesses = _lowest(setting, patches.take(left))
+        deep = np.flatnonzero(least < patches.deep[left])
+        patches, number = patches.take(left[deep]), number[left[deep]]
+        centres, guesses = centres[deep], guesses[deep]
+    return join_states(setting.structure, found), np.concatenate(origin)
 
 
 def _of_cells(eset: EquilibriumSet) -> _Patches:
@@ -160,13 +185,16 @@ def _inside(
     values = in_units(determinants(structure, found.z, found.p), np.repeat(patches.power, points))
     values /= np.repeat(patches.unit, points)
     values[~found.found | ~np.isfinite(values)] = np.nan
+    values = values.reshape(n, points)
     return _Patches(
         patches.unit,
         patches.power,
-        patches.deep,
+        patches.deep
+        if size > NARROWER
+        else np.fmin(patches.deep, DEEP * np.fmin.reduce(values, axis=1)),
         found.z.reshape(n, points, -1),
         found.p.reshape(n, points, -1),
-        values.reshape(n, points),
+        values,
     )
 
 

@@ -4,7 +4,16 @@ from functools import cache, cached_property, partial
 
 import numpy as np
 
-from equimorph.arrays import Entries, Float, Int, Lanes, Parameters, Sides, Values
+from equimorph.arrays import (
+    Directions,
+    Entries,
+    Float,
+    Int,
+    Lanes,
+    Parameters,
+    Sides,
+    Values,
+)
 from equimorph.linalg import Border, BorderedSolution
 from equimorph.linalg.condensed import PIVOT_GUARD
 from equimorph.linalg.dense import no_border
@@ -14,10 +23,10 @@ from equimorph.structures.equations import (
     Advance,
     AnyBorder,
     Direction,
+    Equations,
     Force,
-    JointEquations,
+    LinearSystem,
     Shift,
-    Solver,
 )
 from equimorph.structures.spatial.derivative_kernels import equations_lanes
 from equimorph.structures.spatial.energy_kernels import energies_lanes
@@ -131,7 +140,7 @@ def _closures(
     return axes, closing, compliance
 
 
-class SpatialMechanics(SpatialLagrangian, JointEquations):
+class SpatialMechanics(SpatialLagrangian, Equations):
     """Mechanics of the Lagrangian of a `SpatialModel`; methods as in `structures.contract`."""
 
     @cached_property
@@ -208,10 +217,14 @@ class SpatialMechanics(SpatialLagrangian, JointEquations):
         """D²F[v, w]."""
         return np.ascontiguousarray(self.equations(z, p, v, w)[3])
 
-    def linearised(self, z: Lanes, p: Parameters, dp: Parameters) -> tuple[np.ndarray, ...]:
-        """F and F_p·dp."""
-        both = self.equations(z, p, (np.zeros_like(z), dp))
-        return np.ascontiguousarray(both[0]), np.ascontiguousarray(both[1])
+    def linear_system(self, z: Lanes, p: Parameters, directions: Directions) -> LinearSystem:
+        """F, F_p along directions, two in each call of the kernel, and solves with F_z."""
+        moves = [(np.zeros_like(z), dp) for dp in directions.transpose(1, 0, 2)]
+        twos = [moves[i : i + 2] for i in range(0, max(len(moves), 1), 2)]
+        jets = [self.equations(z, p, *two, mixed=False) for two in twos]
+        columns = [column for jet in jets for column in jet[1:]]
+        along = np.stack(columns, axis=1) if columns else np.zeros((len(z), 0, self.size))
+        return LinearSystem(np.ascontiguousarray(jets[0][0]), along, partial(self.solve, z, p))
 
     def along_orbits(self, z: Lanes, p: Parameters) -> Lanes:
         """Rates of z at which states turn about an axis for nothing: 0."""
@@ -295,12 +308,6 @@ class SpatialMechanics(SpatialLagrangian, JointEquations):
             found.determinant[unsafe] = again.determinant
             found.pivot_ratio[unsafe] = again.pivot_ratio
         return found
-
-    def solver(
-        self, parts: tuple[np.ndarray, ...], z: Lanes, p: Parameters, shift: Shift = None
-    ) -> Solver:
-        """Solves with F_z − shift·mass."""
-        return partial(self.solve, z, p, shift=shift)
 
     def index(self, z: Lanes, p: Parameters) -> Int[np.ndarray, " lanes"]:
         """Negative eigenvalues of the constrained Hessian, from the pivots of the fused step."""
