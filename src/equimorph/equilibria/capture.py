@@ -1,6 +1,7 @@
 """How complete a search is: capture and recapture over its independent runs."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.special import gammaln, xlogy
@@ -56,6 +57,11 @@ class Completeness:
         return int(self.captured.shape[1])
 
     @property
+    def added(self) -> int:
+        """Number of them that no run found: recaptures that failed."""
+        return int((~self.captured.any(axis=0)).sum())
+
+    @property
     def per_run(self) -> tuple[int, ...]:
         """Number of equilibria found by each run."""
         return tuple(int(count) for count in self.captured.sum(axis=1))
@@ -64,33 +70,40 @@ class Completeness:
     def estimate(self) -> float:
         """Chao's estimate of the number of equilibria, a lower bound if some are harder to find.
 
-        ``S + (m−1)/m · f₁(f₁−1)/(2(f₂+1))`` after m runs, with f₁ and f₂ the numbers of equilibria
-        found by exactly one and by exactly two runs.
+        ``S + (m−1)/m · f₁(f₁−1)/(2(f₂+1))`` after m runs, with S, f₁ and f₂ the numbers of
+        equilibria found by any run, by exactly one and by exactly two. Those added to them are some
+        of the rest.
         """
         times = self.captured.sum(axis=0)
         once, twice = int((times == 1).sum()), int((times == 2).sum())
-        return self.found + (self.runs - 1) / self.runs * once * (once - 1) / (2.0 * (twice + 1.0))
+        rest = (self.runs - 1) / self.runs * once * (once - 1) / (2.0 * (twice + 1.0))
+        return float(max(self.found, self.found - self.added + rest))
 
     @property
     def upper(self) -> float:
         """Number of equilibria at about 95 % confidence, if all are as easy to find as those found.
 
-        Largest number that the profile likelihood does not reject [Cormack1992]_; infinite where
-        no equilibrium was found twice, or some that are not resolved, or where none was found and
-        no random guess led to any state. Never below `estimate`.
+        Largest number that the profile likelihood of the runs does not reject [Cormack1992]_;
+        infinite where no equilibrium was found twice, or some that are not resolved, or where none
+        was found and no random guess led to any state. So it is where more were found, others being
+        added to those of the runs: then these are harder to find. Never below `estimate`.
         """
         if self.unresolved or (self.found == 0 and self.starts > 0 and self.arrived == 0):
             return np.inf
-        if self.found == 0:
-            return self.estimate
-        if int(self.captured.sum()) == int(self.captured.any(axis=0).sum()):
-            return np.inf
-        number = int(self.captured.any(axis=0).sum())
+        bound = self._bound_of_runs
+        return np.inf if self.found > bound else max(self.estimate, bound)
+
+    @cached_property
+    def _bound_of_runs(self) -> float:
+        """Largest number that is not rejected by what runs found."""
+        number = self.found - self.added
+        if int(self.captured.sum()) == number:
+            return np.inf if self.found else 0.0
         best = self._log_likelihood(number)
         while best - self._log_likelihood(number + 1) <= 0.5 * REJECTED:
             number += 1
             best = max(best, self._log_likelihood(number))
-        return max(self.estimate, float(number))
+        return float(number)
 
     def _log_likelihood(self, number: int) -> float:
         """Of `number` equilibria, at the most likely chance of a catch, the same for all."""
@@ -117,6 +130,9 @@ class Completeness:
                 f"{found}; there may be any number more, as {self.unresolved} starts led to where "
                 f"{self.cause}, or exclude such states by a constraint"
             )
+        if self.found > self._bound_of_runs:
+            why = f"as no run found {self.added} of them"
+            return f"{found}; there may be any number more, {why}{self._arrivals}"
         return (
             f"{found}; estimated {self.estimate:.1f}, at most {self.upper:.0f} (95 %) if all are "
             f"equally easy to find{self._arrivals}"
