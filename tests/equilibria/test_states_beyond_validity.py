@@ -35,9 +35,10 @@ def test_members_of_less_than_no_length_are_no_states(seed):
 
 def test_states_met_beyond_validity_are_named_once():
     found = find_equilibria(three_hinged(), {"F": 1.0})
-    assert len(found) == 3
-    assert len(found.invalid) == 4
-    assert found.completeness.found == 3
+    assert found.completeness.found == len(found) == 3
+    gaps = np.abs(found.invalid.z[:, None] - found.invalid.z).max(axis=2)
+    assert (gaps[np.triu_indices(len(gaps), 1)] > 1e-3).all()
+    assert len(gaps) >= 4
 
 
 def test_states_beyond_a_constraint_are_not_named():
