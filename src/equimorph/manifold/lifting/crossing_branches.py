@@ -207,9 +207,13 @@ def _starts(
 
 
 def first_steps(
-    pairing: Pairing, line: ParameterLine, z: Lanes, p: Parameters, tangents: tuple[Lanes, Values]
-) -> tuple[Int[np.ndarray, " m"], Front]:
-    """Points on half-branches that begin with known tangents on lines, and which these are."""
+    pairing: Pairing, line: ParameterLine, z: Lanes, p: Parameters, tangents: tuple[Lanes, Values],
+    index: Items | None = None,
+) -> tuple[Int[np.ndarray, " m"], Front]:  # fmt: skip
+    """Points on half-branches that begin with known tangents on lines, and which these are.
+
+    `index`: of regular beginnings; first steps pass no fold.
+    """
     t = np.einsum("li,li->l", p - line.start, line.velocity) / (line.velocity**2).sum(axis=1)
     here = Front(z, t, *tangents, np.zeros(len(z), int))
     good = np.zeros(len(z), bool)
@@ -221,7 +225,10 @@ def first_steps(
         lines = line.take(todo)
         front, found = step_along(lines, here.take(todo), np.full(len(todo), distance))
         inside = found & (front.t > 0.0) & (front.t < 1.0)
-        inside &= are_feasible(pairing.setting.constraints, front.z, lines.parameters(front.t))
+        places = lines.parameters(front.t)
+        inside &= are_feasible(pairing.setting.constraints, front.z, places)
+        if index is not None:
+            inside &= pairing.setting.structure.index(front.z, places) == index[todo]
         there, good[todo[inside]] = there.with_rows(todo[inside], front.take(inside)), True
     at = np.flatnonzero(good)
     return at, there.take(at)

@@ -1,5 +1,6 @@
 """Sheet lifting, the discs: polygons become triangulated discs that fit together."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from itertools import pairwise, starmap
 
@@ -26,6 +27,7 @@ from equimorph.manifold.lifting.patterns import cut_by_pattern
 from equimorph.manifold.lifting.pins import groups_of, pin_groups
 from equimorph.manifold.lifting.polygon_cuts import (
     MEETING,
+    MOST_FOLDS,
     SINGULAR,
     TURN,
     Chord,
@@ -50,8 +52,8 @@ class Discs:
     triangles whose polygons could not be closed and cut without doubt. met: which sides ab,
     bc, ca of each triangle lie on crossings; sheet: number, over its grid triangle, of the smooth
     sheet that it belongs to. astray: doubtful grid triangles with the fold and both ends of an open
-    polygon that finds no corner there, or, three times, an end whose constraint leads to no known
-    point.
+    polygon that finds no corner there, or, three times, a fold or an end of a constraint that may
+    lead to no known point.
     """
 
     corners: Triples
@@ -167,7 +169,9 @@ def _close(pairing: Pairing, plans: list[Plan], found: _Found) -> None:
 def _join_folds(pairing: Pairing, plans: list[Plan], found: _Found) -> list[Plan]:
     """Decide which folds of each polygon belong together; return plans where that is certain."""
     ways = [ways_to_join(pairing, plan) for plan in plans]
-    several = [k for k, each in enumerate(ways) if len(each) > 1]
+    several = [
+        k for k, each in enumerate(ways) if len(each) > 1 or len(plans[k].those(TURN)) > MOST_FOLDS
+    ]
     followed = followed_ways(pairing, [plans[k] for k in several], [ways[k] for k in several])
     for k, each in zip(several, followed, strict=True):
         ways[k] = each
@@ -179,6 +183,7 @@ def _join_folds(pairing: Pairing, plans: list[Plan], found: _Found) -> list[Plan
             decided.append(plan)
         else:
             found.undecided.add(plan.polygon.triangle)
+            found.astray.extend(_leaving(plan, plan.those(TURN)))
     # what is said of a crossing must be said of both sheets
     crossed = [bool(plan.those(MEETING)) for plan in decided]
     decided = [
@@ -189,6 +194,12 @@ def _join_folds(pairing: Pairing, plans: list[Plan], found: _Found) -> list[Plan
     lost = put_hubs(pairing, decided)
     found.undecided.update(lost)
     return [plan for plan in decided if plan.polygon.triangle not in lost]
+
+
+def _leaving(plan: Plan, folds: Iterable[int]) -> list[tuple[int, int, int, int]]:
+    """What may lead out of the triangle of an undecided polygon; see `Discs`."""
+    triangle = plan.polygon.triangle
+    return [(triangle, each, each, each) for each in folds if plan.kinds[each] == VertexKind.FOLD]
 
 
 def _split_chords(pairing: Pairing, plans: list[Plan], found: _Found) -> None:
@@ -213,6 +224,7 @@ def _split_chords(pairing: Pairing, plans: list[Plan], found: _Found) -> None:
     for (plan, chord), point in zip(folds, extra, strict=True):
         if point is None:
             found.undecided.add(plan.polygon.triangle)
+            found.astray.extend(_leaving(plan, chord))
         else:
             plan.middle[chord] = point
     met = {

@@ -21,7 +21,7 @@ from equimorph.model import are_feasible, worst_excess
 
 NOISE = 1e-6
 """Distance in the metric below which two folds are one."""
-STEPS = 40
+STEPS = 80
 """Steps that are tried, at most: a fold that is nearly straight takes one."""
 PARTS = 0.0, -0.25, 0.25
 """Places where corners are looked for: parts of the way, off where a constraint would be met if it

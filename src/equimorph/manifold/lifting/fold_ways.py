@@ -30,7 +30,8 @@ def ways_to_join(pairing: Pairing, plan: Plan) -> Ways:
 def followed_ways(pairing: Pairing, plans: list[Plan], choices: list[Ways]) -> list[Ways]:
     """Ways that join every fold with the one to which it leads through the triangle.
 
-    A fold that is lost on the way, or leaves where none is known, leaves the choice open.
+    A fold that is lost on the way, or leaves where none is known, leaves the choice open. Where
+    there are too many folds for a choice, it is made when these are known.
     """
     kinds = pairing.points.kind
     pairs = [
@@ -49,5 +50,8 @@ def followed_ways(pairing: Pairing, plans: list[Plan], choices: list[Ways]) -> l
             zip(left, nearest_at(pairing, list(left.values()), np.array(folds, int)), strict=True)
         )
         chords = {chord_of(fold, end) for fold, end in ends.items() if end >= 0}
-        followed.append([way for way in ways if chords <= set(way)])
+        own = ways or match_folds(
+            plan.points, plan.singular, pairing.points.index.__getitem__, chords
+        )
+        followed.append([way for way in own if chords <= set(way)])
     return followed

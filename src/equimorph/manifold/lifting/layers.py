@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from equimorph.arrays import Int, Items, Lanes, Parameters, Place
+from equimorph.arrays import Int, Place
 from equimorph.equilibria.critical import null_border
 from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.lifting.cap_walks import cap_at, cap_exits
@@ -99,7 +99,8 @@ def _led_from_constraints(pairing: Pairing, exits: Sequence[CapExit]) -> LedOut:
     sign = np.where(sense, -1.0, 1.0)
     tangents = (sign / norm[owner])[:, None] * along[owner], sign / norm[owner]
     lines = line.take(owner)
-    halves, front = first_steps(pairing, lines, z[owner], p[owner], tangents)
+    index = pairing.setting.structure.index(z, p)[owner]
+    halves, front = first_steps(pairing, lines, z[owner], p[owner], tangents, index)
     return lead_out(pairing, halves, edge[owner[halves]], lines.take(halves), front)
 
 
@@ -131,8 +132,7 @@ def _enter_at_folds(pairing: Pairing, pairs: Sequence[tuple[int, int]]) -> bool:
             kept.append(one)
     if not kept:
         return False
-    edge, z, p = (np.array([getattr(each, name) for each in kept]) for name in ("edge", "z", "p"))
-    entered = _enter(pairing, edge, z, p)
+    entered = _enter(pairing, kept)
     tried = {id(each) for each in new if fold_at(pairing, each) < 0}
     for key, each in pairing.exits.items():
         if id(each) in tried:
@@ -147,8 +147,9 @@ def _same(one: FoldExit, other: FoldExit) -> bool:
     )
 
 
-def _enter(pairing: Pairing, edge: Items, z: Lanes, p: Parameters) -> bool:
+def _enter(pairing: Pairing, exits: Sequence[FoldExit]) -> bool:
     """Follow both halves of the curves through folds over edges, and enter what they lead to."""
+    edge, z, p = (np.array([getattr(each, name) for each in exits]) for name in ("edge", "z", "p"))
     setting, store = pairing.setting, pairing.points
     structure = setting.structure
     phi = null_border(structure, z, p)
@@ -170,6 +171,8 @@ def _enter(pairing: Pairing, edge: Items, z: Lanes, p: Parameters) -> bool:
     left = np.setdiff1d(left, met.lanes[met.kinds == VertexKind.CROSSING])
     entered = np.unique(left[np.isin(left ^ 1, left)] // HALVES).tolist()
     for k in entered:
+        if fold_at(pairing, exits[k]) >= 0:  # on an arc through several folds
+            continue
         ends = [met.take(met.lanes == HALVES * k + half) for half in range(HALVES)]
         _enter_arc(pairing, int(edge[k]), z[k], p[k], ends)
     pairing.fit()

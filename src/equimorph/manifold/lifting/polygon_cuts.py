@@ -3,7 +3,7 @@
 See docs/decisions.md, "Folds and constraints are built into the cells".
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field
 from functools import cache, lru_cache
 from itertools import chain, combinations, product
@@ -20,8 +20,8 @@ Piece = tuple[int, ...]
 Chord = tuple[int, int]
 
 MOST_FOLDS = 16
-"""Folds of a polygon that are joined, at most: 16 can be in 1430 ways, each two more in 3.4 times
-as many."""
+"""Folds of a polygon of which it is not known with which others they belong together, at most: 16
+can be joined in 1430 ways, each two more in 3.4 times as many."""
 REGULAR, TURN, MEETING = 0, 1, 2
 """What the points of polygons are."""
 SORTS = MEETING, TURN
@@ -31,9 +31,14 @@ OVERTURNED = 1e6
 
 
 def match_folds(
-    polygon: Sequence[int], singular: Callable[[int], int], index: Callable[[int], int]
+    polygon: Sequence[int],
+    singular: Callable[[int], int],
+    index: Callable[[int], int],
+    joined: Collection[Chord] = (),
 ) -> list[list[Chord]]:
     """All ways to join the folds of a polygon by chords that do not cross and part the indices.
+
+    With the chords `joined`, which are known.
 
     Returned are sets of chords for which every piece has one index; exactly one means that the
     folds are joined with certainty, none that the polygon contradicts itself. `singular` gives the
@@ -55,21 +60,27 @@ def match_folds(
             arcs[-1] = index(point)
         else:
             return []
-    if len(folds) % 2 or len(folds) > MOST_FOLDS or any(arc is None for arc in arcs):
+    free = set(folds).difference(*joined)
+    if len(folds) % 2 or len(free) > MOST_FOLDS or any(arc is None for arc in arcs):
         return []
     kinds = {point: singular(point) for point in folds}
-    return sorted(sorted(way) for way in _matchings(folds, [arc or 0 for arc in arcs], kinds))
+    ways = _matchings(folds, [arc or 0 for arc in arcs], kinds, joined)
+    return sorted(sorted(way) for way in ways)
 
 
-def _matchings(folds: list[int], arcs: list[int], kinds: dict[int, int]) -> list[list[Chord]]:
+def _matchings(
+    folds: list[int], arcs: list[int], kinds: dict[int, int], joined: Collection[Chord]
+) -> list[list[Chord]]:
     """Chords for folds in a circle; arcs[k] is the index between folds k and k + 1.
 
     The first of some folds side by side is joined with another one; what lies inside this chord
     and what lies behind it are matched separately, each arc of a piece with the same index.
     """
+    own = {end: chord for chord in joined for end in chord}
 
     def fits(a: int, b: int, inside: int, outside: int) -> bool:
-        return kinds[a] == kinds[b] and (kinds[a] == MEETING or inside != outside)
+        known = all(own.get(end, (a, b)) == (a, b) for end in (a, b))
+        return known and kinds[a] == kinds[b] and (kinds[a] == MEETING or inside != outside)
 
     @cache
     def ways(first: int, end: int, outside: int) -> list[list[Chord]]:

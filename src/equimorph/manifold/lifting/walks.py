@@ -1,7 +1,9 @@
 """Curves on the set followed in the planes of grid triangles: folds, and where a constraint acts.
 
-Steps along the tangent are halved until their corrections are short and both tangents alike; the
-last one ends on the side itself.
+Steps along the tangent are halved until their corrections are short and both tangents alike, and
+lead from one end to the other; the last one ends on the side itself.
+
+See docs/decisions.md, "Folds are followed through their triangles".
 """
 
 from dataclasses import dataclass, replace
@@ -25,6 +27,9 @@ from equimorph.manifold.geometry.tangents import (
 
 OFF, STRAIGHT = 0.25, 0.9
 """Longest correction of a step, in its length, and least cosine of the tangents at its ends."""
+SWAYED = 0.02
+"""How far a step along a fold may be from the mean of the tangents at its ends, in its length: that
+of an arc is so to third order, one to a fold beside it is not, be their tangents alike."""
 CORRECTIONS = 10
 """Of a guess of a step, at most: those that are close enough, see `OFF`, need fewer. Of 4800 lanes
 of set 923 of the soak 2000 used up 60, which took half of its time."""
@@ -114,6 +119,7 @@ class Walk(Columns):
             cosine[near] = alike.sum(axis=1)
         if not self.cap:  # null vectors have no orientation
             tangent, cosine = tangent * np.copysign(1.0, cosine)[:, None], np.abs(cosine)
+            good &= self._swayed(setting, there, tangent) < SWAYED
         good &= cosine > STRAIGHT
         moved = replace(
             self, z=there.z, p=there.p, tangent=tangent, rows=rows, length=2.0 * length,
@@ -124,6 +130,15 @@ class Walk(Columns):
         good &= ~leaves | outwards
         waiting = replace(self, length=0.5 * length)
         return moved.where(good, waiting), np.where(good & leaves, apex, -1)
+
+    def _swayed(self, setting: Setting, there: Pinned, tangent: Full) -> Values:
+        """How far steps are from the mean of the tangents at their ends, in their lengths."""
+        step = embed(setting, there.z, there.p) - embed(setting, self.z, self.p)
+        size = np.linalg.norm(step, axis=1, keepdims=True)
+        mean = 0.5 * tangent_rows(setting, self.tangent + tangent)
+        return np.asarray(
+            np.linalg.norm(step - size * mean, axis=1) / np.maximum(size[:, 0], 1e-300)
+        )
 
     def _ways_out(self, setting: Setting) -> tuple[Values, Items]:
         """Lengths of the straight ways out of the triangles, and corners opposite the sides."""
