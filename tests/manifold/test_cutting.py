@@ -6,6 +6,7 @@ from hypothesis import given, strategies as st
 
 from equimorph.manifold.lifting.polygon_cuts import (
     MEETING,
+    MOST_FOLDS,
     TURN,
     chords_to_split,
     cut,
@@ -18,11 +19,11 @@ from equimorph.manifold.lifting.polygon_cuts import (
 FLAT = np.array([[0.0, 0.0], [3.0, -1.0], [6.0, 0.0], [3.0, 1.0]])
 
 
-def matched(index_or_fold):
+def matched(index_or_fold, joined=()):
     """Match the folds of a polygon given as indices, with "F" for folds."""
     kinds = dict(enumerate(index_or_fold))
     return match_folds(
-        list(kinds), lambda point: kinds[point] == "F", lambda point: int(kinds[point])
+        list(kinds), lambda point: kinds[point] == "F", lambda point: int(kinds[point]), joined
     )
 
 
@@ -96,6 +97,27 @@ def test_four_folds_of_three_indices_have_one_way():
 def test_four_folds_of_two_indices_have_two_ways():
     ways = matched([0, "F", 1, "F", 0, "F", 1, "F"])
     assert sorted(ways) == [[(1, 3), (5, 7)], [(1, 7), (3, 5)]]
+
+
+def test_known_chords_leave_fewer_ways():
+    polygon = [0, "F", 1, "F"] * 3
+    assert len(matched(polygon)) == 5
+    assert matched(polygon, [(1, 3)]) == [
+        [(1, 3), (5, 7), (9, 11)],
+        [(1, 3), (5, 11), (7, 9)],
+    ]
+    assert matched(polygon, [(1, 5)]) == []
+
+
+def test_more_folds_than_can_be_joined_in_all_ways_need_known_chords():
+    polygon = [0, "F", 1, "F"] * (MOST_FOLDS // 2 + 1)
+    chords = [(k, k + 2) for k in range(1, len(polygon), 4)]
+    assert matched(polygon) == []
+    assert matched(polygon, chords[2:]) == [
+        [(1, 3), (5, 7), *chords[2:]],
+        [(1, 7), (3, 5), *chords[2:]],
+    ]
+    assert matched(polygon, chords) == [chords]
 
 
 def test_nested_folds_have_one_way():

@@ -82,9 +82,12 @@ def test_folds_that_turn_in_coarse_cells_need_no_bisection(dimension, seed):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("dimension", "count", "most"), [(2, 40, 2), (3, 7, 22)])
+@pytest.mark.parametrize(("dimension", "count", "most"), [(2, 40, 2), (3, 7, 1)])
 def test_random_quintics_are_whole(dimension, count, most):
-    """By the normals, 40 cells of 40 sets were bisected, and 147 of seven over three parameters."""
+    """By the normals, 40 cells of 40 sets were bisected, and 147 of seven over three parameters.
+
+    Of these 22 were where closed curves over edges were not known.
+    """
     bisected = 0
     for seed in range(count):
         quintic = Quintic(seed, dimension)
@@ -97,10 +100,10 @@ def test_random_quintics_are_whole(dimension, count, most):
 @pytest.mark.slow
 def test_what_a_bisection_leaves_is_found_only_once(monkeypatch):
     """Doubtful cells are divided several times; to find everything anew gives the same set."""
-    at_once = Quintic(2, 3).lifted()
+    at_once = Quintic(3, 3).lifted()
     assert at_once.audit.bisected > 0
     monkeypatch.setattr(cells, "volumes_over", lambda pairing, _: volumes_over(pairing, None))
-    anew = Quintic(2, 3).lifted()
+    anew = Quintic(3, 3).lifted()
     # checks search below cells that are drawn, and these stand in another order
     assert replace(at_once.audit, arrived=anew.audit.arrived) == anew.audit
     one, other = (eset.coordinates[np.lexsort(eset.coordinates.T)] for eset in (at_once, anew))

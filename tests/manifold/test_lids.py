@@ -10,6 +10,8 @@ from typecheck import unchecked
 BOX = em.Box(a=(-1.0, 1.1), b=(-1.0, 1.2), c=(-0.9, 1.0))
 SHEET = "(x - 0.3*a + 0.2*b**2 - 0.1*c)**2/2"
 CUSP = "x**4/4 - (a + 0.3*c)*x**2/2 - (b + 0.2*c)*x"
+STAIR = "x**4/4 - 3*0.35**2*x**2/2 - (a + {}*b + {}*c)*x"
+"""A sheet with two folds side by side, between the same indices."""
 UMBILIC = "x**3/3 + y**3/3 + 0.6*x*y - (a + 0.2*c**2)*x - (b - 0.3*c)*y"
 
 
@@ -182,3 +184,23 @@ def test_lids_may_meet_cusps(normal, limit, most):
         found = [len(each.states) for each in eset.over(a=a, b=b, c=c)]
     assert clear.sum() > 150
     assert np.array_equal(np.array(found)[clear > 0], wanted[clear > 0])
+
+
+@pytest.mark.parametrize(("seed", "most"), [(0, 3), (1, 21)])
+def test_lids_are_parted_along_several_folds(seed, most):
+    """Random planes across two folds that pass tetrahedra side by side: rims with four corners.
+
+    14 and 52 cells were bisected.
+    """
+    draw = np.random.default_rng([11, seed])
+    tilt, way, lean = (
+        draw.uniform(-0.5, 0.5, 2),
+        draw.uniform(-0.5, 0.5, 2),
+        draw.uniform(-0.3, 0.3),
+    )
+    eset = bounded(
+        lambda z, p: p[:, 2] + p[:, :2] @ way + lean * z[:, 0] - 0.2, STAIR.format(*tilt)
+    )
+    assert_faithful(eset)
+    assert (eset.audit.components, eset.audit.euler_characteristic) == (1, 1)
+    assert eset.audit.bisected <= most

@@ -73,7 +73,7 @@ def _follow(pairing: Pairing, triangle: Items, cap: Items) -> list[CapExit | Non
     setting, store, mesh = pairing.setting, pairing.points, pairing.mesh
     corners, z, p = mesh.vertices[mesh.triangles[triangle]], store.z[cap], store.p[cap]
     index = store.index[cap]
-    walk = Walk.start_from(setting, corners, z, p, index, cap=True)
+    walk = Walk.start_from(setting, corners, z, p, index, VertexKind.CAP)
     left, edge = np.ones(len(cap), bool), np.full(len(cap), -1)
     ways = [[each] for each in zip(z, p, index.tolist(), strict=True)]
     for _ in range(STEPS):

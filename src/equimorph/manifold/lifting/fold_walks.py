@@ -51,7 +51,7 @@ def _follow(pairing: Pairing, triangle: Items, fold: Items) -> list[FoldExit | N
     setting, store, mesh = pairing.setting, pairing.points, pairing.mesh
     corners = mesh.vertices[mesh.triangles[triangle]]
     first = store.z[fold], store.p[fold], store.index[fold]
-    walk = Walk.start_from(setting, corners, *first, cap=False)
+    walk = Walk.start_from(setting, corners, *first, VertexKind.FOLD)
     left, edge = np.ones(len(fold), bool), np.full(len(fold), -1)
     inside_z, inside_p, depth = walk.z.copy(), walk.p.copy(), np.zeros(len(fold))
     for _ in range(STEPS):

@@ -33,11 +33,9 @@ from equimorph.manifold.lifting.inner_points import (
     pin_inside,
 )
 from equimorph.manifold.lifting.pairing import Pairing
+from equimorph.manifold.lifting.rim_chords import CORNERS, chords_of_rims
 from equimorph.manifold.lifting.spheres import Parts
-from equimorph.manifold.lifting.surfaces import Surfaces
-
-CORNERS = 2
-"""Corners of a rim between two indices: the ends of a fold on its lid."""
+from equimorph.manifold.lifting.surfaces import Surfaces, rings
 
 
 def close_rims(
@@ -91,59 +89,38 @@ def _parted(
 ) -> tuple[Surfaces, Int[np.ndarray, " rims"], Bool[np.ndarray, " rims"]]:
     """Surfaces whose rims are parted along the folds of their lids, with a corner on each of these.
 
-    Between two indices a lid has one fold: where there are more, how they lead on is not known.
+    See `chords_of_rims`.
     """
-    count, store = len(surfaces.rim_surface), pairing.points
-    owner = surfaces.owner[surfaces.rim_surface]
-    rim, corner, low, fits = _corners(pairing, surfaces)
-    lost = np.zeros(count, bool)
-    lost[rim[~fits]] = True
-    mixed = store.kind[surfaces.sides] == VertexKind.CROSSING
-    lost[np.intersect1d(rim, surfaces.rim[mixed.any(axis=1)])] = True
-    first = np.flatnonzero(np.diff(rim, prepend=-1) | np.diff(low, prepend=low[:1]))
-    size = np.diff(first, append=len(rim))
-    lost[rim[first[size != CORNERS]]] = True
-    first = first[~lost[rim[first]]]
-    rim, low, ends = rim[first], low[first], corner[first[:, None] + np.arange(CORNERS)]
-    middle = np.array(
-        pin_inside(pairing, ends.tolist(), VertexKind.CORNER, owner[rim], cap=True), int
-    )
+    lost = np.zeros(len(surfaces.rim_surface), bool)
+    rim, low, ends = chords_of_rims(pairing, surfaces, lost)
+    owner = surfaces.owner[surfaces.rim_surface[rim]]
+    middle = np.array(pin_inside(pairing, ends.tolist(), VertexKind.CORNER, owner, cap=True), int)
     lost[rim[middle < 0]] = True
     kept = ~lost[rim]
     rim, low, ends, middle = (each[kept] for each in (rim, low, ends, middle))
     # each side of each fold, from both ends to the middle
     sides = np.stack([ends, np.stack([middle, middle], axis=1)], axis=2).reshape(-1, 2)
-    sides = np.concatenate([sides, sides])
-    side_rim, side_index = np.tile(np.repeat(rim, 2), 2), np.repeat([low, low + 1], 2)
-    base = int(surfaces.side_index.max(initial=0)) + 3
-    at = surfaces.rim * base
-    at[np.isin(surfaces.rim, rim)] += 1 + surfaces.side_index[np.isin(surfaces.rim, rim)]
-    keys, label = np.unique(
-        np.concatenate([at, side_rim * base + 1 + side_index]), return_inverse=True
-    )
-    caps = np.full(len(keys), -1)
-    caps[label[len(at) :]] = sides[:, 1]
-    parted = replace(
+    old = len(surfaces.sides)
+    sides = np.concatenate([surfaces.sides, sides, sides])
+    side_rim = np.concatenate([surfaces.rim, np.tile(np.repeat(rim, 2), 2)])
+    side_index = np.concatenate([surfaces.side_index, np.repeat([low, low + 1], 2)])
+    # between two folds there may be several parts of one index
+    parted = np.where(np.isin(side_rim, rim), 1 + side_index, 0)
+    key = side_rim * (int(parted.max(initial=0)) + 1) + parted
+    groups, group = np.unique(key, return_inverse=True)
+    label = rings(sides, group, len(groups)).label
+    caps = np.full(int(label.max(initial=-1)) + 1, -1)
+    caps[label[old:]] = sides[old:, 1]
+    of_rim = np.zeros(len(caps), int)
+    of_rim[label] = side_rim
+    parts = replace(
         surfaces,
-        sides=np.concatenate([surfaces.sides, sides]),
+        sides=sides,
         rim=label,
-        side_index=np.concatenate([surfaces.side_index, side_index]),
-        rim_surface=surfaces.rim_surface[keys // base],
+        side_index=side_index,
+        rim_surface=surfaces.rim_surface[of_rim],
     )
-    return parted, caps, lost[keys // base]
-
-
-def _corners(
-    pairing: Pairing, surfaces: Surfaces
-) -> tuple[Items, Items, Items, Bool[np.ndarray, " n"]]:
-    """Rim, point and lower index of the corners of rims; whether one index is the next."""
-    row, end = np.nonzero(pairing.points.kind[surfaces.sides] == VertexKind.CORNER)
-    rim, point, index = surfaces.rim[row], surfaces.sides[row, end], surfaces.side_index[row]
-    # along a rim every point has two sides
-    pairs = np.lexsort([index, point, rim]).reshape(-1, 2)
-    rim, point, low, high = rim[pairs[:, 0]], point[pairs[:, 0]], *index[pairs].T
-    order = np.lexsort([marks_of(pairing.points)[point], low, rim])
-    return rim[order], point[order], low[order], (high == low + 1)[order]
+    return parts, caps, lost[of_rim]
 
 
 def joined_by_tubes(pairing: Pairing, parts: Parts) -> Int[np.ndarray, " k"]:

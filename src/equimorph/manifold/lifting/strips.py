@@ -24,8 +24,8 @@ def strips_astray(pairing: Pairing, astray: Int[np.ndarray, "a 4"]) -> dict[int,
     rings close, in the middle of these.
     """
     out = dict(pairing.rings)
-    kind = pairing.points.kind[astray]
-    astray = astray[(kind[:, 1] == VertexKind.FOLD) & (kind[:, 2] != VertexKind.FOLD)]
+    kind = pairing.points.kind[astray[:, 1:3]]
+    astray = astray[(kind == [VertexKind.FOLD, VertexKind.CAP]).all(axis=1)]
     if len(astray) == 0:
         return out
     triangle, fold = astray[:, 0], astray[:, 1]

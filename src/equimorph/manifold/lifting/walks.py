@@ -1,5 +1,7 @@
 """Curves on the set followed in the planes of grid triangles: folds, and where a constraint acts.
 
+And folds along constraints in grid tetrahedra, whose faces are the sides of these.
+
 Steps along the tangent are halved until their corrections are short and both tangents alike, and
 lead from one end to the other; the last one ends on the side itself.
 
@@ -13,6 +15,7 @@ import numpy as np
 from equimorph.arrays import Float, Items, Lanes, Parameters, Values
 from equimorph.columns import Columns
 from equimorph.manifold.geometry.exact_points import STEPS, Aim, Pinned, correct_points
+from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.setting import Setting, embed
 from equimorph.manifold.geometry.simplices import plane_bases, shares_in
 from equimorph.manifold.geometry.tangents import (
@@ -39,21 +42,23 @@ AT_KINKS = replace(FEW, contraction=0.5)
 BEYOND = 1e-9
 """Barycentric coordinate up to which points lie beyond sides: that of round-off."""
 Full = Float[np.ndarray, "n full"]
+Simplices = Float[np.ndarray, "n corners d"]
+"""Corners of triangles or tetrahedra, in free parameters."""
 
 
 @dataclass(frozen=True)
 class Walk(Columns):
-    """Points of folds, or of where a constraint acts, in triangles.
+    """Points of folds, or of where a constraint acts, in triangles; where both meet, in tetrahedra.
 
-    cap: whether it is a constraint; tangent: of unit length in the embedding, with changes of z and
-    of the scaled free parameters; rows: a basis, in the embedding, of a space near that of the set,
-    of a constraint with an orientation by which its excess rises on the same side all the way;
-    length: of the next step, at most; start: number of the corner opposite the side of the first
-    point, −1 later; low: index on the lower side of a fold.
+    kind: `FOLD`, `CAP`, or `CORNER` for both; tangent: of unit length in the embedding, with
+    changes of z and of the scaled free parameters; rows: a basis, in the embedding, of a space near
+    that of the set, of a constraint with an orientation by which its excess rises on the same side
+    all the way; length: of the next step, at most; start: number of the corner opposite the side of
+    the first point, −1 later; low: index on the lower side of a fold.
     """
 
-    cap: bool
-    corners: Float[np.ndarray, "n 3 d"]
+    kind: VertexKind
+    corners: Simplices
     z: Lanes
     p: Parameters
     tangent: Full
@@ -64,26 +69,26 @@ class Walk(Columns):
 
     @classmethod
     def start_from(
-        cls, setting: Setting, corners: Float[np.ndarray, "n 3 d"], z: Lanes, p: Parameters,
-        low: Items, *, cap: bool,
+        cls, setting: Setting, corners: Simplices, z: Lanes, p: Parameters, low: Items,
+        kind: VertexKind,
     ) -> "Walk":  # fmt: skip
-        """First points on sides of triangles, with tangents that lead into these."""
+        """First points on sides of triangles or tetrahedra, with tangents that lead into these."""
         n, d = setting.structure.unknowns, len(setting.free)
         rows = np.zeros((len(z), d, n + d))
         rows[:, :, n:] = np.eye(d)
-        tangent, rows = _tangents(setting, cap, corners, z, p, rows)
+        tangent, rows = _tangents(setting, kind, corners, z, p, rows)
         side = shares_in(corners, p[:, setting.free]).argmin(axis=1)
-        walk = cls(cap, corners, z, p, tangent, rows, np.full(len(z), np.inf), side, low)
+        walk = cls(kind, corners, z, p, tangent, rows, np.full(len(z), np.inf), side, low)
         inwards = np.take_along_axis(walk.rates(setting), side[:, None], axis=1)
         sense = np.copysign(1.0, inwards)
         rows[:, 0] *= sense
         return replace(walk, tangent=tangent * sense)
 
-    def rates(self, setting: Setting) -> Float[np.ndarray, "n 3"]:
+    def rates(self, setting: Setting) -> Float[np.ndarray, "n corners"]:
         """Changes of the barycentric coordinates along the tangents."""
         along = self.tangent[:, -len(setting.free) :] * setting.scales
         there = shares_in(self.corners, self.corners[:, 0] + along)
-        return np.asarray(there - np.array([1.0, 0.0, 0.0]))
+        return np.asarray(there - np.eye(self.corners.shape[1])[0])
 
     def step(self, setting: Setting) -> tuple["Walk", Items]:
         """Points after one step, or the same ones with a shorter step; corners opposite the sides.
@@ -113,11 +118,11 @@ class Walk(Columns):
         tangent, rows, cosine = self.tangent.copy(), self.rows.copy(), np.zeros(len(way))
         if len(near := np.flatnonzero(good)):
             own, at = self.take(near), there.take(near)
-            found = _tangents(setting, self.cap, own.corners, at.z, at.p, own.rows)
+            found = _tangents(setting, self.kind, own.corners, at.z, at.p, own.rows)
             tangent[near], rows[near] = found
             alike = tangent_rows(setting, found[0]) * tangent_rows(setting, own.tangent)
             cosine[near] = alike.sum(axis=1)
-        if not self.cap:  # null vectors have no orientation
+        if self.kind != VertexKind.CAP:  # null vectors have no orientation
             tangent, cosine = tangent * np.copysign(1.0, cosine)[:, None], np.abs(cosine)
             good &= self._swayed(setting, there, tangent) < SWAYED
         good &= cosine > STRAIGHT
@@ -141,7 +146,7 @@ class Walk(Columns):
         )
 
     def _ways_out(self, setting: Setting) -> tuple[Values, Items]:
-        """Lengths of the straight ways out of the triangles, and corners opposite the sides."""
+        """Lengths of the straight ways out, and corners opposite the sides."""
         rates = self.rates(setting)
         shares = np.maximum(shares_in(self.corners, self.p[:, setting.free]), 0.0)
         ways = np.where(rates < 0.0, shares / np.maximum(-rates, 1e-300), np.inf)
@@ -150,7 +155,7 @@ class Walk(Columns):
         return ways.min(axis=1), ways.argmin(axis=1)
 
     def inside(self, setting: Setting, length: Values) -> Pinned:
-        """Points across the tangents, from guesses, in the planes of the triangles."""
+        """Points across the tangents, from guesses."""
         span = plane_bases(self.corners / setting.scales)
         rows = tangent_rows(setting, self.tangent)[:, None]
         middle = embed(setting, self.z, self.p)
@@ -158,21 +163,17 @@ class Walk(Columns):
 
     def on_side(self, setting: Setting, length: Values, apex: Items) -> Pinned:
         """Points on sides, from guesses."""
-        every = np.arange(len(apex))
-        ends = [self.corners[every, (apex + k) % 3] for k in (1, 2)]
-        along = (ends[1] - ends[0]) / setting.scales
-        size = np.linalg.norm(along, axis=1, keepdims=True)
-        along = along / size
-        p = self.p.copy()
-        off = (p[:, setting.free] - ends[0]) / setting.scales
-        share = (off * along).sum(axis=1, keepdims=True)
-        p[:, setting.free] = ends[0] + share * along * setting.scales
+        count = self.corners.shape[1]
+        others = (apex[:, None] + np.arange(1, count)) % count
+        side = np.take_along_axis(self.corners, others[:, :, None], axis=1)
+        span, p = plane_bases(side / setting.scales), self.p.copy()
+        off = (p[:, setting.free] - side[:, 0]) / setting.scales
+        flat = np.einsum("nk,nkd->nd", np.einsum("nd,nkd->nk", off, span), span)
+        p[:, setting.free] = side[:, 0] + flat * setting.scales
         middle = embed(setting, self.z, p)
         guess = replace(self, p=p)
-        found = guess._corrected(setting, along[:, None], middle, middle[:, None][:, :0], length)
-        place = (found.p[:, setting.free] - ends[0]) / setting.scales
-        share = (place * along).sum(axis=1) / size[:, 0]
-        on = (share > -BEYOND) & (share < 1.0 + BEYOND)
+        found = guess._corrected(setting, span, middle, middle[:, None][:, :0], length)
+        on = shares_in(side, found.p[:, setting.free]).min(axis=1) > -BEYOND
         return replace(found, found=found.found & on)
 
     def _corrected(
@@ -183,9 +184,15 @@ class Walk(Columns):
         rows: Float[np.ndarray, "n k coordinates"],
         length: Values,
     ) -> Pinned:
-        aim = Aim(setting, not self.cap, self.cap, span, middle, rows)
-        low, limits = (None, AT_KINKS) if self.cap else (self.low, FEW)
+        fold, cap = _met(self.kind)
+        aim = Aim(setting, fold, cap, span, middle, rows)
+        low, limits = self.low if fold else None, AT_KINKS if cap else FEW
         return correct_points(aim, self.z, self.p, length, low, limits=limits)
+
+
+def _met(kind: VertexKind) -> tuple[bool, bool]:
+    """Whether points of a kind are those of folds, and of a constraint."""
+    return kind != VertexKind.CAP, kind != VertexKind.FOLD
 
 
 def tangent_rows(
@@ -197,24 +204,31 @@ def tangent_rows(
 
 def _tangents(
     setting: Setting,
-    cap: bool,
-    corners: Float[np.ndarray, "n 3 d"],
+    kind: VertexKind,
+    corners: Simplices,
     z: Lanes,
     p: Parameters,
     rows: Float[np.ndarray, "n d coordinates"],
 ) -> tuple[Full, Float[np.ndarray, "n d coordinates"]]:
-    """Unit tangents of curves in the planes of triangles, and bases of the tangent spaces.
+    """Unit tangents of curves, and bases of the tangent spaces.
 
     Those of folds have either sense; a constraint rises on one side, by the rows' orientation.
     """
-    if cap:
-        frames = tangent_frames(setting, z, p, rows)
-        held = cap_slopes(setting, z, p, frames)
-    else:
+    (fold, cap), held = _met(kind), list[Float[np.ndarray, "n d"]]()
+    if fold:
         forms = fold_forms(setting, z, p)
         frames = tangent_frames(setting, z, p, fold_rows(setting, forms))
-        held = fold_slopes(setting, z, p, frames, forms.null)
-    tangent = np.einsum("nk,nkf->nf", directions(setting, corners, frames, held), frames)
+        held.append(fold_slopes(setting, z, p, frames, forms.null))
+    else:
+        frames = tangent_frames(setting, z, p, rows)
+    if cap:
+        held.append(cap_slopes(setting, z, p, frames))
+    along = (
+        np.cross(held[0], held[1])
+        if fold and cap
+        else directions(setting, corners, frames, held[0])
+    )
+    tangent = np.einsum("nk,nkf->nf", along, frames)
     size = np.linalg.norm(tangent_rows(setting, tangent), axis=1, keepdims=True)
     return tangent / np.maximum(size, 1e-300), frames_in_embedding(setting, frames)
 
