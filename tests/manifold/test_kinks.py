@@ -92,6 +92,8 @@ def assert_right(shape, weights, bound, grid) -> None:
     ("shape", "weights", "bound", "grid"),
     [
         (ridge_of, (0.8, 1.8, 0.9), 0.5, (2, 3, 3)),
+        # two folds end on one lid, both of one fold surface
+        (ridge_of, (1.0659283835396909, 0.7549, 0.973), 0.618, (2, 5, 4)),
         (roof_of, (1.1, 0.8, 1.5), 0.36, (2, 2, 5)),
         (valley_of, (0.6, 0.8, 0.5), 0.4, (3, 3, 3)),
     ],

@@ -118,12 +118,17 @@ def _large(mesh: BaseMesh) -> Bool[np.ndarray, " N"]:
 def _middles(
     pairing: Pairing, parts: Parts, doubtful: Bool[np.ndarray, " N"]
 ) -> Int[np.ndarray, " curves"]:
-    """Exact point inside every curve: a fold, or a crossing; it can be on the constraint."""
+    """Exact point inside every curve: a fold, or a crossing.
+
+    It can be on the constraint if the curve has one fold there: drawn from an end of one of two on
+    the same lid, the fold surface between them would be the lid.
+    """
     count = len(parts.curve_surface)
     at, points = grouped(parts.curve, parts.folds, marks_of(pairing.points))
     middles = np.full(count, -1)
-    own = np.isin(points, parts.closed.caps)
-    middles[at[own]] = points[own]
+    on_lids = np.isin(points, parts.closed.caps)
+    on_lids &= np.bincount(at[on_lids], minlength=count)[at] == 1
+    middles[at[on_lids]] = points[on_lids]
     left = (middles < 0) & parts.whole[parts.curve_surface]
     for kind, own in ((VertexKind.FOLD, ~parts.curve_met), (VertexKind.CROSSING, parts.curve_met)):
         chosen = np.flatnonzero(left & own)
