@@ -201,6 +201,33 @@ class Vanishing(Columns):
         return _differences(scalars, at, move, self.difference, one_sided=self.one_sided)
 
 
+@dataclass(frozen=True)
+class EqualEigenvalues(Columns):
+    """Two eigenvalues of F_z are equal: its reduction to a plane is a multiple of the identity.
+
+    With a border B that spans the plane, ``[F_z Bᵀ; B 0] [X; Λ] = [0; I]`` has minus the reduced
+    matrix in Λ. Both are equal at single points of two-dimensional pieces of the set.
+    """
+
+    rows: Float[np.ndarray, "lanes 2 size"]
+    """What changes of z are multiplied by to give their coordinates in the plane."""
+    critical = False
+
+    def linear(self, at: Critical, move: Move) -> Linear:
+        """By differences along the directions, the border kept."""
+        _, plane, size = self.rows.shape
+
+        def scalars(z: Lanes, p: Parameters) -> Scalars:
+            rows = np.concatenate([self.rows] * (len(z) // len(self.rows)))
+            rhs = np.zeros((len(z), plane, size + plane))
+            rhs[:, :, size:] = np.eye(plane)
+            border = rows, rows, np.zeros((len(z), plane, plane))
+            reduced = at.structure.solve(z, p, rhs, border).x[:, :, size:]
+            return np.stack([reduced[:, 0, 0] - reduced[:, 1, 1], reduced[:, 0, 1]], axis=1)
+
+        return _differences(scalars, at, move, TEST_DIFFERENCE, one_sided=False)
+
+
 def second_derivatives(
     at: Critical, tangents: Sequence[Direction], directions: Sequence[Direction]
 ) -> Float[np.ndarray, "lanes tangents directions"]:
