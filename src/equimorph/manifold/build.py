@@ -32,7 +32,7 @@ from equimorph.manifold.lifting.seeds import Seeds, is_symmetric, seeds
 from equimorph.manifold.lifting.strips import strips_astray
 from equimorph.manifold.lifting.tile_rounds import TileRounds
 from equimorph.manifold.lifting.tiles import cuts_between
-from equimorph.manifold.lifting.twists import states_between
+from equimorph.manifold.lifting.twists import lift_between
 from equimorph.manifold.lifting.unseen import UnseenFinder
 from equimorph.manifold.question import intervals_of, limit_of, setting_of, tiles_of
 from equimorph.manifold.refining.refine import refine_cells
@@ -295,9 +295,7 @@ class _Lifting:
             if cells.doubtful == 0 or last:
                 break
             bisected += cells.doubtful
-            mesh = pairing.mesh
-            recover(pairing, states_between(pairing, cells.doubtful_triangles))
-            if pairing.mesh is not mesh:
+            if lift_between(pairing, cells.doubtful_triangles):
                 continue
             chosen, exits = cells.longest_edges(pairing.mesh), unseen.exits | ring_middles(pairing)
             exits |= strips_astray(pairing, cells.astray)

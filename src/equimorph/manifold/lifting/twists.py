@@ -18,12 +18,20 @@ from equimorph.equilibria.settle import Guards, settle
 from equimorph.manifold.geometry.exact_points import REACH, STEPS, middles
 from equimorph.manifold.geometry.setting import principal_directions
 from equimorph.manifold.geometry.simplices import plane_bases, shares_in
+from equimorph.manifold.lifting.completeness import recover
 from equimorph.manifold.lifting.pairing import Pairing
 from equimorph.structures import States
 from equimorph.structures.metric import products_with
 
 TWICE = 2
 """Ways around a triangle after which two sheets that change places come back."""
+
+
+def lift_between(pairing: Pairing, triangles: Some) -> bool:
+    """Put vertices below the states between sheets that change places; whether there are any."""
+    mesh = pairing.mesh
+    recover(pairing, states_between(pairing, triangles))
+    return pairing.mesh is not mesh
 
 
 def states_between(pairing: Pairing, triangles: Some) -> States:
