@@ -86,7 +86,7 @@ def shares_in(
     return np.concatenate([1.0 - inner.sum(axis=1, keepdims=True), inner], axis=1)
 
 
-def plane_bases(corners: Float[np.ndarray, "n 3 d"]) -> Float[np.ndarray, "n 2 d"]:
-    """Orthonormal vectors along the planes of triangles in d dimensions."""
+def plane_bases(corners: Float[np.ndarray, "n corners d"]) -> Float[np.ndarray, "n k d"]:
+    """Orthonormal vectors along simplices in d dimensions: one fewer than these have corners."""
     sides = np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)
     return np.ascontiguousarray(np.swapaxes(np.linalg.qr(sides)[0], 1, 2))
