@@ -223,7 +223,9 @@ class EqualEigenvalues(Columns):
             rhs[:, :, size:] = np.eye(plane)
             border = rows, rows, np.zeros((len(z), plane, plane))
             reduced = at.structure.solve(z, p, rhs, border).x[:, :, size:]
-            return np.stack([reduced[:, 0, 0] - reduced[:, 1, 1], reduced[:, 0, 1]], axis=1)
+            with np.errstate(invalid="ignore"):  # infinite where the rows span no plane
+                apart = reduced[:, 0, 0] - reduced[:, 1, 1]
+            return np.stack([apart, reduced[:, 0, 1]], axis=1)
 
         return _differences(scalars, at, move, TEST_DIFFERENCE, one_sided=False)
 
