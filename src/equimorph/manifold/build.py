@@ -183,9 +183,7 @@ def _on_grids(order: _Order, intervals: tuple[int, ...]) -> EquilibriumSet:
             break
         if order.effort.accuracy is not None:
             eset = refine_cells(eset, order.effort.accuracy, order.progress)
-        # over one parameter no cells are bisected to find what they hide
-        hidden = eset.audit.missing if len(intervals) == 1 else 0
-        if eset.audit.unrefined + hidden == 0 or number == GRIDS - 1:
+        if eset.audit.unrefined == 0 or number == GRIDS - 1:
             break
         # odd numbers stay odd, which keeps lines of symmetry off the grid
         intervals = tuple(2 * n + n % 2 for n in intervals)

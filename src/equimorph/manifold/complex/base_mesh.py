@@ -40,12 +40,19 @@ class BaseMesh:
     @property
     def cells(self) -> Cells:
         """Simplices that fill the box: edges, triangles or tetrahedra."""
-        return (self.edges, self.triangles, self.tetrahedra)[self.dimension - 1]
+        return (self._segments, self.triangles, self.tetrahedra)[self.dimension - 1]
+
+    @cached_property
+    def _segments(self) -> Cells:
+        return np.asarray(self.edges[self.edges_in_use])
 
     @cached_property
     def edges_in_use(self) -> EdgeFlags:
         """Which edges have not been bisected."""
-        used = np.full(len(self.edges), self.dimension == 1)
+        if self.dimension == 1:  # nothing lies between their ends
+            rank = self.vertices[:, 0].argsort().argsort()[self.edges]
+            return np.asarray(np.abs(rank[:, 1] - rank[:, 0]) == 1)
+        used = np.zeros(len(self.edges), bool)
         used[self.sides] = True
         return used
 

@@ -303,7 +303,7 @@ def recover(pairing: Pairing, missing: States) -> None:
         found, origin = seeds_from(pairing.setting, mesh, missing)
         ids, _ = pairing.points.over_vertices(*found)
         missing = missing[np.setdiff1d(np.arange(len(missing)), origin[ids >= known])]
-        if len(missing) == 0 or mesh.dimension == 1:
+        if len(missing) == 0:
             return
         places = missing.p[:, pairing.setting.free]
         _, first = np.unique([mesh.locate(place) for place in places], return_index=True)

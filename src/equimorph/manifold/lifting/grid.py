@@ -264,7 +264,10 @@ def split_at(mesh: BaseMesh, place: Place) -> tuple[int, float]:
     """
     cell, d = mesh.locate(place), mesh.dimension
     shares = barycentric(mesh.vertices[mesh.cells[[cell]]], place)[0]
-    sides = mesh.sides[cell] if d == 2 else np.unique(mesh.sides[mesh.faces[cell]])
+    if d == 1:
+        sides = mesh.edges_in_use.nonzero()[0][[cell]]
+    else:
+        sides = mesh.sides[cell] if d == 2 else np.unique(mesh.sides[mesh.faces[cell]])
     corners = mesh.cells[cell].tolist()
     ends = np.array([[corners.index(end) for end in mesh.edges[side]] for side in sides.tolist()])
     weights = shares[ends]

@@ -90,8 +90,9 @@ class Sheets:
 
     @cached_property
     def above(self) -> CellIndex:
-        """Index of the cells."""
-        overhang = np.where(self._at_an_edge, OVERHANG, 0.0)
+        """Index of the cells; over one parameter they end where the set does."""
+        reach = OVERHANG if len(self.free) > 1 else 0.0
+        overhang = np.where(self._at_an_edge, reach, 0.0)
         return CellIndex.of(self.points.p[:, self.free][self.cells], overhang)
 
     @cached_property
