@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import equimorph as em
+from equimorph.manifold.lifting.grid import grid_lines
 
 DEGREE = 7
 NAMES = [f"c{k}" for k in range(DEGREE + 1)]
@@ -34,6 +35,13 @@ def line():
 @pytest.fixture(scope="module")
 def plane():
     return wells("abcw", "w**2/4 - (a*x + b*(y - x**2/5) + c*x**2 - 0.55)**2", "PQ")
+
+
+@pytest.fixture(scope="module")
+def strips():
+    """Allowed within w/2 of a curve, and farther than 0.1 from there."""
+    u = "(a*x + b*(y - x**2/5) + c*x**2 - 0.2)"
+    return wells("abcw", f"-({u}**2 - w**2/4)*({u}**2 - (0.5*w + 0.1)**2)", "PQ")
 
 
 def covered(eset):
@@ -70,6 +78,41 @@ def test_violations_narrower_than_an_interval_part_a_set_over_one_parameter(line
         edges += [second + width / 2, 3.0]
         assert covered(eset).ravel() == pytest.approx(edges, abs=1e-6)
         assert eset.audit.clean
+
+
+def test_pieces_between_two_violations_over_one_parameter(line):
+    """No vertex lies in them: all of these were missing, half of them under a clean audit."""
+    draw = np.random.default_rng(4)
+    within = [line.descriptor("D") <= 0.0, line.descriptor("D") >= -1e3]
+    for width in np.geomspace(0.009, 0.1, 10):
+        intervals = int(draw.integers(4, 9))
+        lines = grid_lines(em.Box(P=(0.0, 3.0)), (intervals,))[0]
+        middle = 0.5 * (lines[2] + lines[3]) + draw.uniform(-0.05, 0.05)
+        first, last = middle - width / 2, middle + width / 2
+        ends = [first - draw.uniform(0.02, 0.2), first, last, last + draw.uniform(0.02, 0.2)]
+        excess = -np.poly1d(ends, True)
+        fixed = dict.fromkeys(NAMES, 0.0)
+        fixed |= dict(zip(NAMES, excess.coeffs[::-1].tolist(), strict=False))
+        eset = em.equilibrium_set(
+            line, em.Box(P=(0.0, 3.0)), fixed=fixed, within=within, intervals=[intervals]
+        )
+        assert covered(eset).ravel() == pytest.approx([0.0, *ends, 3.0], abs=1e-6)
+        assert eset.audit.clean
+
+
+def test_pieces_between_two_violations_over_two_parameters(strips):
+    """Cells of 0.4 to 0.5: cells of the pieces beside these were thought to have their states."""
+    draw = np.random.default_rng(1)
+    for width in np.geomspace(0.006, 0.1, 8):
+        angle, bow = draw.uniform(0.0, 2.0 * np.pi), draw.uniform(-0.2, 0.2)
+        eset = em.equilibrium_set(
+            strips,
+            em.Box(P=(-1.5, 1.5), Q=(-1.5, 1.5)),
+            fixed={"a": np.cos(angle), "b": np.sin(angle), "c": bow, "w": width},
+            within=[strips.descriptor("D") <= 0.0],
+            intervals=[7, 6],
+        )
+        assert (eset.audit.components, eset.audit.clean) == (3, True)
 
 
 def in_cells(eset, places):

@@ -16,6 +16,7 @@ from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.geometry.setting import Setting
 from equimorph.manifold.geometry.topology import Adjacency, adjacency, facets_of
 from equimorph.manifold.lookup.exact_states import StatesOver
+from equimorph.manifold.lookup.holding import holding
 from equimorph.manifold.lookup.near_crossings import NearCrossings, of_set
 from equimorph.manifold.lookup.near_cusps import cusps_near
 from equimorph.manifold.lookup.over import Sheets
@@ -239,7 +240,7 @@ class EquilibriumSet(Tabular):
         states
             Equilibria over points of the box, within the constraints of the set.
         """
-        return self.sheets.holding(states)
+        return holding(self.sheets, states)
 
     def _parameters_over(
         self, at: Mapping[str, Float[np.ndarray, " points"]]

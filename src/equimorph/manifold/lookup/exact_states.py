@@ -136,6 +136,13 @@ def lift_to(
     return np.concatenate([states.z[still], outcome.z[arrived]]), which
 
 
+def parted(states: States, p: Points, constraints: tuple[Constraint, ...]) -> Flags:
+    """Whether violations end straight lifts from `states` to p, one for each."""
+    line = ParameterLine(states.structure, states.p.copy(), p - states.p)
+    code = trace(line, states.z.copy(), constraints, STRAIGHT_ON).code
+    return np.asarray(code == EventCode.CONSTRAINT)
+
+
 def nearest_pairs(
     structure: Structure,
     z: Float[np.ndarray, "states size"],

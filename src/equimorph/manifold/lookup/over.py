@@ -14,7 +14,6 @@ from equimorph.arrays import (
     CellFlags,
     CellNumbers,
     Cells,
-    Flags,
     Float,
     Int,
     Items,
@@ -45,7 +44,7 @@ from equimorph.manifold.lookup.rims import Rims, nearest_rims, ways_out
 from equimorph.model import Constraint, are_feasible
 from equimorph.structures import States, Structure
 from equimorph.structures.metric import metric_length
-from equimorph.tolerances import SAME_SOLUTION, SAME_STATE
+from equimorph.tolerances import SAME_STATE
 
 OVERHANG = 0.3
 """Barycentric tolerance for using a cell as an initial guess."""
@@ -90,9 +89,8 @@ class Sheets:
 
     @cached_property
     def above(self) -> CellIndex:
-        """Index of the cells; over one parameter they end where the set does."""
-        reach = OVERHANG if len(self.free) > 1 else 0.0
-        overhang = np.where(self._at_an_edge, reach, 0.0)
+        """Index of the cells."""
+        overhang = np.where(self._at_an_edge, OVERHANG, 0.0)
         return CellIndex.of(self.points.p[:, self.free][self.cells], overhang)
 
     @cached_property
@@ -144,41 +142,6 @@ class Sheets:
             z, point, cell = self._beside_crossings(self.crossings, p, z, point, cell)
         return States(self.structure, z, p[point]), point, cell
 
-    def holding(self, states: States) -> tuple[Flags, Numbers]:
-        """Which states are among those over their own points; their cells, −1 if not known.
-
-        The cell whose guess is nearest to a state is tried first, then the next ones; only for what
-        is not found so all states over the point are asked for, once for all that lie over it.
-        """
-        z, p = states.z, states.p
-        near, known, cell = self._near(p[:, self.free]), np.zeros(len(z), bool), np.full(len(z), -1)
-        for most in (1, NEAREST):
-            near = near.take(~known[near.point])
-            good = near.take(self._on_nearest(z, p, near, most))
-            known[good.point], cell[good.point] = True, good.cell
-        rest = np.flatnonzero(~known)
-        if len(rest):
-            places, place = np.unique(p[rest], axis=0, return_inverse=True)
-            over, point, of_over = self.over(places)
-            first, last = (np.searchsorted(point, place, side) for side in ("left", "right"))
-            mine = rest.repeat(last - first)
-            theirs = np.concatenate([np.zeros(0, int), *map(np.arange, first, last)])
-            same = np.flatnonzero(self._are_same(z[mine], over.z[theirs]))
-            known[mine[same]], cell[mine[same]] = True, of_over[theirs[same]]
-        return known, cell
-
-    def _on_nearest(self, z: Lanes, p: Points, near: Hits, most: int) -> Some:
-        """Those of the cells near states, the nearest ones of each, that lead to the states."""
-        guess, pairs = self._guess(near), np.stack([near.point, np.arange(len(near))])
-        some = nearest_pairs(self.structure, z, guess, pairs, near.point, most)
-        own = near.point[some]
-        found, good, index = exact_states(self.structure, guess[some], p[own])
-        good &= index == self.cell_index[near.cell[some]]
-        return np.asarray(some[good & self._are_same(z[own], found)])
-
-    def _are_same(self, z: Lanes, other: Lanes) -> Flags:
-        return np.asarray(metric_length(self.structure, z - other) <= SAME_SOLUTION)
-
     def _beside_cusps(self, p: Points, first: int) -> Found | None:
         """States over points that cells next to cusps hide, if any; `first` is added."""
         if self.cusps is None:
@@ -207,7 +170,7 @@ class Sheets:
         for number in np.unique(of_own[1]):
             here, index = (column[of_own[1] == number] for column in (of_own[0], of_own[2]))
             mine = near.take(near.point == number)
-            there = self._nearest(here, index, self._guess(mine), mine)
+            there = self._nearest(here, index, self.guess(mine), mine)
             parts.append((here, np.full(len(here), number), there))
         z, point, cell = (np.concatenate(column) for column in zip(*parts, strict=True))
         order = np.lexsort((cell, point))
@@ -233,13 +196,13 @@ class Sheets:
 
     def _some(self, p: Points, first: int) -> tuple[Found, Hits | None]:
         """Certain states over points, and the cells near undecided ones; `first` is added."""
-        near = self._near(p[:, self.free])
+        near = self.near(p[:, self.free])
         of_hits = near.cell, near.weights
         tried = worth_trying(of_hits, near.inside, self._brims, self.above.maps, NUDGE)
         if len(tried) == 0:
             return (np.zeros((0, self.points.z.shape[1])), tried, tried), None
         hits = near.take(tried)
-        at, guess = p[hits.point], self._guess(hits)
+        at, guess = p[hits.point], self.guess(hits)
         wanted, room = self.cell_index[hits.cell], self._room[hits.cell]
         z, good, index = exact_states(self.structure, guess, at, wanted)
         mass, converged = self.structure.mass, good.copy()
@@ -257,7 +220,7 @@ class Sheets:
         kept = found[are_feasible(self.constraints, z[found], at[found])]
         return (z[kept], first + hits.point[kept], hits.cell[kept]), doubtful
 
-    def _near(self, x: Float[np.ndarray, "points d"]) -> Hits:
+    def near(self, x: Float[np.ndarray, "points d"]) -> Hits:
         """Cells near points, including those at the rims whose bands contain the points."""
         near = self.above.near(x)
         point, cell = self._rims.near(x)
@@ -280,7 +243,7 @@ class Sheets:
         on &= (whole.counts != 2) | (index != index[:, :1]).any(axis=1)
         return Rims.of(self.points.p[:, self.free], whole, np.flatnonzero(on))
 
-    def _guess(self, hits: Hits) -> Lanes:
+    def guess(self, hits: Hits) -> Lanes:
         """Interpolation between the corners, at the nearest point of the cell.
 
         From a fold on, states move like the root of the way in the parameters.
@@ -299,7 +262,7 @@ class Sheets:
 
     def _search(self, p: Points, near: Hits) -> Iterator[Found]:
         """States over points by lifts and Newton from all regular vertices near each of them."""
-        guess = self._guess(near)
+        guess = self.guess(near)
         pairs = np.stack(
             [np.repeat(near.point, self.cells.shape[1]), self.cells[near.cell].ravel()]
         )
@@ -366,7 +329,7 @@ class Sheets:
         first, last = (np.searchsorted(point, near.point[hit], side) for side in ("left", "right"))
         number = np.repeat(np.arange(len(hit)), last - first)
         state = np.concatenate([np.zeros(0, int), *map(np.arange, first, last)])
-        guess, pairs = self._guess(near)[hit], np.stack([state, number])
+        guess, pairs = self.guess(near)[hit], np.stack([state, number])
         nearest = nearest_pairs(self.structure, z, guess, pairs, number, NEAREST)
         number, state = number[nearest], state[nearest]
         velocity = np.zeros((len(state), p.shape[1]))
