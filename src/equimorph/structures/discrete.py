@@ -110,24 +110,6 @@ class DiscreteStructure(JointEquations, Structure):
         names = [field.name for field in fields(Advance)]
         return Advance(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
 
-    def with_best_forces(self, u: Float[np.ndarray, "lanes unknowns"], p: Parameters) -> Lanes:
-        """Unknowns with the multipliers that balance them best, in the metric.
-
-        From the derivative where these are zero, as which they stay where that is no number.
-        """
-        n, across = self.unknowns, 1.0 / np.sqrt(self.mass)
-        z = np.concatenate([u, np.zeros((len(u), self.constraints))], axis=1)
-        if self.constraints:
-            force, _, entries = self.linearised(z, p, np.zeros_like(p))
-            rows, columns = self.layout.rows, self.layout.columns
-            arm = (rows >= n) & (columns < n)
-            arms = np.zeros((len(z), n, self.constraints))
-            arms[:, columns[arm], rows[arm] - n] = entries[:, arm]
-            usable = np.isfinite(arms).all(axis=(1, 2)) & np.isfinite(force).all(axis=1)
-            inverse = np.linalg.pinv(across[:, None] * arms[usable])
-            z[usable, n:] = -np.einsum("lmn,ln->lm", inverse, across * force[usable, :n])
-        return z
-
     # --- the natural state ----------------------------------------------------------------------
 
     @cached_property

@@ -273,7 +273,18 @@ class EnergyStructure(DiscreteStructure):
 
     def natural_guess(self, p: Parameters) -> Lanes:
         """Natural values of the unknowns, and the multipliers that balance them best."""
-        return self.with_best_forces(self._natural(p), p)
+        return self._solve_multipliers(self._natural(p), p)
+
+    def _solve_multipliers(self, u: Float[np.ndarray, "lanes n"], p: Parameters) -> Lanes:
+        n = self.unknowns
+        z = np.concatenate([u, np.zeros((len(u), self.constraints))], axis=1)
+        if self.constraints:
+            gradients = self.layout.dense(self.entries(z, p))[:, :n, n:]
+            usable = np.isfinite(gradients).all(axis=(1, 2))
+            inverse = np.linalg.pinv(gradients[usable])
+            force = self.residual(z, p)[usable, :n]
+            z[usable, n:] = -np.einsum("lmn,ln->lm", inverse, force)
+        return z
 
     def sample(self, p: Parameters, generator: np.random.Generator) -> Lanes:
         """Unknowns within their ranges of guesses, with the multipliers that balance them best."""
@@ -282,7 +293,7 @@ class EnergyStructure(DiscreteStructure):
         for i, unknown in enumerate(self._unknowns):
             if unknown.range is not None:
                 u[:, i] = generator.uniform(*unknown.range, len(p))
-        return self.with_best_forces(u, p)
+        return self._solve_multipliers(u, p)
 
     @cached_property
     def whole_turns(self) -> WholeTurns:

@@ -349,27 +349,24 @@ class FrameMechanics(DiscreteStructure):
     def sample(self, p: Parameters, generator: np.random.Generator) -> Lanes:
         """Random turns of the joints around those of supports, waves along the members, and forces.
 
-        Some half waves in each member, and forces of the size of its buckling load or, in every
-        second guess, those that balance it best: states of many waves are met by these alone.
+        A few half waves in each member and forces of the size of its buckling load.
         """
         model, lanes = self.model, len(p)
         nodes = np.zeros((lanes, len(model.place)))
         around = self._turns_of_supports(p)
         turn = generator.normal(size=around.shape)
-        modes, s = np.arange(1, 9), np.linspace(0.0, 1.0, model.piece_nodes.shape[1])
+        modes, s = np.arange(1, 4), np.linspace(0.0, 1.0, model.piece_nodes.shape[1])
         size = generator.uniform(size=(lanes, 1))
         for row, ends in zip(model.piece_nodes, model.network.ends, strict=True):
             base, middle = (
                 each[:, ends[:1]] * (1.0 - s) + each[:, ends[1:]] * s for each in (turn, around)
             )
-            waves = generator.normal(size=(lanes, len(modes))) * (1.5 / np.sqrt(modes))
+            waves = generator.normal(size=(lanes, len(modes))) * (1.5 / modes)
             nodes[:, row] = middle + size * (
                 0.5 * base + waves @ np.sin(np.pi * np.outer(modes, s))
             )
         forces = 10.0 * size * generator.normal(size=(lanes, self.constraints))
-        guesses = np.concatenate([nodes[:, model.place >= 0], forces], axis=1)
-        guesses[::2] = self.with_best_forces(guesses[::2, : self.unknowns], p[::2])
-        return guesses
+        return np.concatenate([nodes[:, model.place >= 0], forces], axis=1)
 
     def _turns_of_supports(self, p: Parameters) -> Float[np.ndarray, "lanes joints"]:
         """Turns that supports hold, or springs have at rest; their mean where there is neither."""
