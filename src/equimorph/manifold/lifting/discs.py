@@ -197,7 +197,12 @@ def _join_folds(pairing: Pairing, plans: list[Plan], found: _Found) -> list[Plan
 
 
 def _leaving(plan: Plan, folds: Iterable[int]) -> list[tuple[int, int, int, int]]:
-    """What may lead out of the triangle of an undecided polygon; see `Discs`."""
+    """What may lead out of the triangle of an undecided polygon; see `Discs`.
+
+    No fold beside a crossing: it may end there, at a hilltop.
+    """
+    if plan.those(MEETING):
+        return []
     triangle = plan.polygon.triangle
     return [(triangle, each, each, each) for each in folds if plan.kinds[each] == VertexKind.FOLD]
 
