@@ -10,6 +10,7 @@ See docs/decisions.md, "Determinants lead to islands inside cells".
 """
 
 from dataclasses import dataclass
+from hashlib import sha256
 from itertools import combinations
 
 import numpy as np
@@ -79,11 +80,12 @@ class IslandFinder:
             return eset.points[:0]
         patches = _of_cells(eset)
         least, centres, _ = _models(setting, patches)
-        names = [each.tobytes() for each in patches.z]
-        known = np.array([name in self._without for name in names], bool)
-        deep = np.flatnonzero((least < patches.deep) & ~known)
+        deep = np.flatnonzero(least < patches.deep)
+        names = np.array([sha256(each.tobytes()).digest() for each in patches.z[deep]], object)
+        new = np.flatnonzero([name not in self._without for name in names])
+        deep, names = deep[new], names[new]
         found, origin = _zoom(setting, patches.take(deep), centres[deep])
-        self._without.update(names[number] for number in np.delete(deep, origin))
+        self._without.update(np.delete(names, origin))
         cells = [eset.mesh.locate(place) for place in found.p[:, setting.free]]
         return found[np.unique(cells, return_index=True)[1]]
 
