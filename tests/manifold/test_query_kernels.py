@@ -14,6 +14,7 @@ from equimorph.manifold.lookup.kernels import (
     balanced,
     cells_by_bin,
     guesses,
+    longest_sides,
     one_of_each,
     worth_trying,
 )
@@ -58,6 +59,19 @@ def test_boxes_that_meet_are_found_once(d):
     found = np.sort(pairs, axis=1)
     assert len(np.unique(found, axis=0)) == len(found) > 50
     assert set(map(tuple, found.tolist())) == set(zip(one[meet], other[meet], strict=True))
+
+
+@pytest.mark.parametrize("d", [1, 2, 3])
+def test_the_longest_side_from_the_first_corner_is_measured_by_the_metric(d):
+    """In numpy, cell by cell; entries behind the unknowns do not count."""
+    x, cells = sheets(d)
+    mass = np.array([0.5, 2.0, 3.0])
+    z = np.random.default_rng(d).normal(size=(len(x), 5))
+    room = np.empty(len(cells))
+    longest_sides(cells, z, mass, room)
+    for own, found in zip(cells, room, strict=True):
+        sides = (z[own[1:]] - z[own[0]])[:, :3] * np.sqrt(mass)
+        assert np.linalg.norm(sides, axis=1).max() == pytest.approx(found, rel=1e-14)
 
 
 @pytest.mark.parametrize("d", [1, 2, 3])

@@ -204,6 +204,19 @@ def worth_trying(hits, inside, brims, maps, nudge):
 
 
 @njit(**ACCURATE)
+def longest_sides(cells, z, mass, out):
+    """Length in the metric of the longest side from the first corner of each cell."""
+    for c in range(len(cells)):
+        first, longest = cells[c, 0], 0.0
+        for k in range(1, cells.shape[1]):
+            other, total = cells[c, k], 0.0
+            for j in range(len(mass)):
+                total += (z[other, j] - z[first, j]) ** 2 * mass[j]
+            longest = max(longest, total)
+        out[c] = np.sqrt(longest)
+
+
+@njit(**ACCURATE)
 def one_of_each(hits, states, guess, room, mass, same):
     """Hits that found a state that no other one of the same point found, sorted.
 

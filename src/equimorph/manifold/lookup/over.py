@@ -37,7 +37,13 @@ from equimorph.manifold.lookup.exact_states import (
     lifts_across_folds,
     nearest_pairs,
 )
-from equimorph.manifold.lookup.kernels import balanced, guesses, one_of_each, worth_trying
+from equimorph.manifold.lookup.kernels import (
+    balanced,
+    guesses,
+    longest_sides,
+    one_of_each,
+    worth_trying,
+)
 from equimorph.manifold.lookup.near_crossings import NearCrossings
 from equimorph.manifold.lookup.near_cusps import NearCusps, united
 from equimorph.manifold.lookup.rims import Rims, nearest_rims, ways_out
@@ -254,11 +260,9 @@ class Sheets:
     @cached_property
     def _room(self) -> Float[np.ndarray, " C"]:
         """How far states may be from their guess: twice the longest side from the first corner."""
-        first, longest = self.points.z[self.cells[:, 0]], np.zeros(len(self.cells))
-        for corner in self.cells.T[1:]:
-            side = metric_length(self.structure, self.points.z[corner] - first)
-            np.maximum(longest, side, out=longest)
-        return 2.0 * longest + SAME_STATE
+        room = np.empty(len(self.cells))
+        longest_sides(self.cells, self.points.z, self.structure.mass, room)
+        return 2.0 * room + SAME_STATE
 
     def _search(self, p: Points, near: Hits) -> Iterator[Found]:
         """States over points by lifts and Newton from all regular vertices near each of them."""
