@@ -166,6 +166,23 @@ def test_a_cantilever_that_is_bent_back_is_found(load, seed):
     assert np.sort(tips[inside, 1]) == pytest.approx(np.sort(planar.height(1.0)(flat)), abs=1e-6)
 
 
+@pytest.mark.parametrize("direction", [(-0.6, 0.8), (-1.0, 0.0)])
+@pytest.mark.parametrize("seed", [0, 1])
+def test_states_in_a_plane_are_found_between_a_pin_and_a_clamp(direction, seed):
+    """All eight of the planar rod: guesses that bend in a plane are under forces in it."""
+    options = {"ends": ("pinned", "clamped"), "span": 0.8}
+    options["loads"] = {"P": em.PointForce(0.5, direction)}
+    rod = em.SpatialRod(torsion=1.0, lateral=3.0, **options).resolving(15.0)
+    planar = em.Rod(**options).resolving(15.0)
+    at = {"theta_B": 0.4, "P": 0.8}
+    flat = em.find_equilibria(planar, at, within=[planar.max_curvature <= 15.0])
+    found = em.find_equilibria(rod, at, within=[rod.max_curvature <= 15.0], seed=seed)
+    inside = np.abs(rod.shape(found.z, found.p)[:, :, 2]).max(axis=1) < 1e-6
+    energies = [np.sort([state.energy for state in each]) for each in (flat, found[inside])]
+    assert len(flat) == 8
+    assert energies[1] == pytest.approx(energies[0], abs=1e-6)
+
+
 # --- the plane inside the space ------------------------------------------------------------------
 
 FAMILY = {

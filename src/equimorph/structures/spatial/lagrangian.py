@@ -42,6 +42,11 @@ WHOLE_TURNS = np.array([0.0, -1.0, 1.0, -2.0, 2.0])
 FORCES = 8.0
 """Spread of the support forces of random guesses."""
 
+BENDINGS = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 1.0, 1.0], [1.0, 1.0, 1.0]])
+"""Axes t, n, b about which random guesses turn: two kinds bend in a plane."""
+FORCES_OF_BENDINGS = np.array([[1.0, 0.0, 1.0], [1.0, 1.0, 0.0], [1.0, 1.0, 1.0], [1.0, 1.0, 1.0]])
+"""Directions x, y, z of their support forces."""
+
 Nodes = Float[np.ndarray, "lanes nodes 4"]
 
 
@@ -202,14 +207,15 @@ class SpatialLagrangian(RodMechanics):
     def sample(self, p: Parameters, generator: np.random.Generator) -> Lanes:
         """Rotations between those of the ends, turned by random waves, with random multipliers.
 
-        About all axes of the cross-sections, or in half of the guesses only about n or b: states
-        bent in a plane are common, and of the other guesses one in thousands leads to some of them.
+        About all axes of the cross-sections, or in half of the guesses only about n or b, under
+        forces in the plane of bending: states that stay in a plane are common, and of the other
+        guesses one in thousands leads to some of them.
         """
         lanes, s, modes = len(p), self.mesh.nodes, np.arange(1, 7)
         amplitude = generator.normal(size=(lanes, len(modes), 3)) * (3.0 / modes)[:, None]
         amplitude *= generator.uniform(size=(lanes, 1, 1))
-        axes = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 1.0, 1.0], [1.0, 1.0, 1.0]])
-        amplitude *= axes[generator.integers(len(axes), size=lanes)][:, None]
+        kind = generator.integers(len(BENDINGS), size=lanes)
+        amplitude *= BENDINGS[kind][:, None]
         start, stop = self.model.held
         if start and stop:
             waves = np.sin(np.pi * np.outer(s, modes))
@@ -218,6 +224,7 @@ class SpatialLagrangian(RodMechanics):
         turns = exponential(np.einsum("nm,lmk->lnk", waves, amplitude))
         q = product(self.between(p), turns)[:, self.model.unknown_nodes]
         forces = generator.normal(size=(lanes, self.constraints)) * FORCES
+        forces *= FORCES_OF_BENDINGS[kind] @ np.abs(self.model.reaction[:, : self.constraints])
         return np.concatenate([q.reshape(lanes, self.unknowns), forces], axis=1)
 
     def between(self, p: Parameters) -> Nodes:
