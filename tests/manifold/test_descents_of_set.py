@@ -19,7 +19,7 @@ def test_a_stable_sheet_that_no_search_sees_is_found(monkeypatch, distance):
     """E' = (x − 3)(x − a)(x − a − d)(x − a − 2d): x = a + d lies between two unstable sheets."""
     for module in (seeds, completeness):
         monkeypatch.setattr(module, "search_points", blind(module.search_points))
-    monkeypatch.setattr(completeness, "_scattered", lambda eset, *_: eset.points[:0])
+    monkeypatch.setattr(completeness, "SCATTERED", 0)
     with unchecked():
         eset = em.equilibrium_set(close_sheets(distance), BOX, intervals=(6, 7))
     assert eset.audit.clean
@@ -43,7 +43,7 @@ def test_sheets_that_join_others_only_beyond_the_box_are_met_by_lines(monkeypatc
 
     for module in (seeds, completeness):
         monkeypatch.setattr(module, "search_points", blind(module.search_points, lower))
-    monkeypatch.setattr(completeness, "_scattered", lambda eset, *_: eset.points[:0])
+    monkeypatch.setattr(completeness, "SCATTERED", 0)
     cusp = em.EnergyStructure(
         "x**4/4 - p*x**2/2 + r*x",
         [em.Unknown("x", "1", guesses=(-2.0, 2.0))],

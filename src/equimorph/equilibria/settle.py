@@ -345,7 +345,8 @@ def _lengthening(here: Points, step: Step, known: Known) -> Values:
     """Factor of Newton steps for m(u) F = 0 with m = Π (1 + 1/‖u − uᵢ‖²), uᵢ known solutions.
 
     The Newton step of the product is that of F, lengthened by 1/(1 − ∇(log m)·du)
-    [FarrellBirkissonFunke2015]_. Without known solutions it is one.
+    [FarrellBirkissonFunke2015]_. Without known solutions it is one. A solution at which a lane
+    begins has no side to which it pushes, and does not: it is found again.
     """
     if known is None:
         return np.ones(len(here.z))
@@ -353,8 +354,10 @@ def _lengthening(here: Points, step: Step, known: Known) -> Values:
     gap = here.z[:, None, :n] - known
     squared = metric_length(structure, gap) ** 2
     along = np.einsum("lri,i,li->lr", gap, structure.mass, step.change[:, :n])
-    slopes = -2.0 * along / (squared * (1.0 + squared))
-    return np.asarray(1.0 / (1.0 - np.nansum(slopes, axis=1)))
+    slopes = np.zeros_like(squared)
+    np.divide(-2.0 * along, squared * (1.0 + squared), slopes, where=squared > 0.0)
+    with np.errstate(divide="ignore"):  # the step of the product may be endless
+        return np.asarray(1.0 / (1.0 - slopes.sum(axis=1)))
 
 
 def _apply_guards(

@@ -16,6 +16,7 @@ from equimorph.manifold.lifting.cells import CellFinder, Cells, Outlook, account
 from equimorph.manifold.lifting.completeness import Check, check, recover
 from equimorph.manifold.lifting.copies import without_copies
 from equimorph.manifold.lifting.crossing_branches import flood_crossings, ring_middles
+from equimorph.manifold.lifting.endless import refuse_copies
 from equimorph.manifold.lifting.flood import flood
 from equimorph.manifold.lifting.grid import (
     Lines,
@@ -235,6 +236,7 @@ def _complete(
         points = _checks(effort.checks, order.setting)
         found = check(eset, generator, points, islands, order.progress)
         lacking = len(found.missing)
+        refuse_copies(eset, found.missing)
         if lacking == 0 or number == SEARCHES - 1:
             break
         recovered += lacking

@@ -12,7 +12,6 @@ import numpy as np
 from equimorph.arrays import Float, Int, Lanes, Places
 from equimorph.equilibria import Completeness, search_points
 from equimorph.equilibria.random_search import Ground, Pools
-from equimorph.equilibria.settle import Guards, free_directions, settle
 from equimorph.manifold.complex.base_mesh import BaseMesh
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.manifold.geometry.setting import Setting
@@ -22,10 +21,11 @@ from equimorph.manifold.lifting.grid import bisect, split_at
 from equimorph.manifold.lifting.hidden_islands import IslandFinder
 from equimorph.manifold.lifting.pairing import Pairing
 from equimorph.manifold.lifting.parted_pieces import between_pieces
+from equimorph.manifold.lifting.scattered import PER_FREE, Scattered, push_on, scatter
 from equimorph.manifold.lifting.seeds import Seeds, polish
 from equimorph.manifold.lifting.states_in_sides import are_grazing, states_in_sides
 from equimorph.manifold.lookup.exact_states import exact_states, lift_to
-from equimorph.model import Progress, are_feasible, position
+from equimorph.model import Progress, are_feasible
 from equimorph.structures import States, join_states
 
 STARTS = 200
@@ -35,10 +35,6 @@ FIRST, FIRST_OF = 2, 4
 takes three quarters of the time of two."""
 SCATTERED = 2000
 """Random points with one random guess each, from which Newton starts in addition to searches."""
-PER_FREE = 4
-"""Number of these guesses per guess that is corrected with the parameters free as well."""
-ITERATIONS = 40
-"""Of Newton's method from there, at most."""
 
 
 @dataclass(frozen=True)
@@ -86,8 +82,8 @@ def check(
 
     Thoroughly at `points`, and from one guess each at `SCATTERED` others: so pieces over a small
     part of the box are seen, too. If something is missing at the first points or elsewhere, the
-    other points wait: the set that is lifted from it is checked again. So the last check has
-    searched at all points, unless it says what is missing.
+    other points wait, and so do guesses that are pushed on: the set that is lifted from it is
+    checked again. So the last check has searched everywhere, unless it says what is missing.
     """
     progress.report("independent checks", 0, points)
     chosen = [
@@ -100,7 +96,12 @@ def check(
     if not places:
         return Check(0, eset.points[:0])
     seed, first = int(generator.integers(2**31)), max(FIRST, points // FIRST_OF)
-    found = _searched(eset, places[:first], seed).joined(_elsewhere(eset, seed, islands))
+    scattered = scatter(eset, SCATTERED, np.random.default_rng(seed))
+    found = _searched(eset, places[:first], seed)
+    found = found.joined(_elsewhere(eset, scattered, seed, islands))
+    if len(found.missing):
+        return found
+    found = found.joined(_led_to(eset, push_on(eset, scattered.arrivals)))
     if len(found.missing) or len(places) <= first:
         return found
     progress.report("independent checks", first, points)
@@ -130,26 +131,33 @@ def _searched(eset: EquilibriumSet, places: list[dict[str, float]], seed: int) -
     return Check(met, lacking, left_out=left_out, starts=starts, arrived=arrived)
 
 
-def _elsewhere(eset: EquilibriumSet, seed: int, islands: IslandFinder) -> Check:
+def _led_to(eset: EquilibriumSet, states: States) -> Check:
+    """What guesses led to."""
+    resolved = states.resolved
+    found = states[np.flatnonzero(resolved)]
+    left_out = len(_left_out(eset, states[np.flatnonzero(~resolved)]))
+    return Check(len(found), _lacking(found, eset), left_out=left_out)
+
+
+def _elsewhere(
+    eset: EquilibriumSet, scattered: Scattered, seed: int, islands: IslandFinder
+) -> Check:
     """What guesses over their own points, sides, descents, lines and images lead to."""
-    scattered = _scattered(eset, SCATTERED, np.random.default_rng(seed))
-    resolved = scattered.resolved
+    led_to = _led_to(eset, scattered.found)
     in_sides, grazing = _in_sides(eset, np.random.default_rng(seed))
     led, pools = descents_of_set(eset), _on_lines(eset, np.random.default_rng(seed))
     begun = len(pools.ground.p)
     met = _within(pools, pools.z[begun:], pools.group[begun:])
     structure = eset.structure
     beside = _belonging(eset, join_states(structure, [islands.find(eset), _mirrored(eset)]))
-    found = scattered[np.flatnonzero(resolved)]
-    told = (found, led.landed, met, beside)
+    told = (led.landed, met, beside)
     entering = in_sides[np.flatnonzero(in_sides.resolved)]
     parted = between_pieces(eset)
     lacking = join_states(structure, [*(_lacking(each, eset) for each in told), entering, parted])
     dropped = [_within(pools, *each) for each in pools.unresolved]
-    dropped.append(scattered[np.flatnonzero(~resolved)])
     dropped.append(in_sides[np.flatnonzero(~in_sides.resolved)])
     left_out = len(_left_out(eset, join_states(structure, dropped)))
-    return Check(len(found), lacking, led.outcomes, len(met), left_out, grazing)
+    return led_to.joined(Check(0, lacking, led.outcomes, len(met), left_out, grazing))
 
 
 def _left_out(eset: EquilibriumSet, dropped: States) -> States:
@@ -172,30 +180,6 @@ def _in_sides(eset: EquilibriumSet, generator: np.random.Generator) -> tuple[Sta
     held = (places == eset.box.lower) * 1 + (places == eset.box.upper) * 2
     _, first = np.unique(held, axis=0, return_index=True)
     return found[np.flatnonzero(~only)], places[first]
-
-
-def _scattered(eset: EquilibriumSet, count: int, generator: np.random.Generator) -> States:
-    """Equilibria to which Newton leads from random guesses, each over its own point of the box.
-
-    Twice: at fixed parameters, and with all free ones free as well, onto the nearest piece of the
-    set. The second finds closed pieces far smaller than a cell, over which no random point lies.
-    Among them are states that the discretisation does not resolve.
-    """
-    structure, names = eset.structure, eset.names
-    middle = dict(zip(names, (0.5 * (eset.box.lower + eset.box.upper)).tolist(), strict=True))
-    p = np.tile(eset.parameters_at(middle), (count, 1))
-    free = np.array([position(structure.parameters, name) for name in names])
-    p[:, free] = generator.uniform(eset.box.lower, eset.box.upper, (count, len(free)))
-    guess, guards = structure.sample(p, generator), Guards(iterations=ITERATIONS)
-    fixed = settle(structure, guess, p, guards=guards)
-    some = slice(0, count // PER_FREE)
-    directions = free_directions(structure, free, len(p[some]))
-    freed = settle(structure, guess[some], p[some], directions, guards=guards, frames=False)
-    z, p = np.concatenate([fixed.z, freed.z]), np.concatenate([fixed.p, freed.p])
-    found = np.concatenate([fixed.found, freed.found])
-    found &= ((eset.box.lower <= p[:, free]) & (p[:, free] <= eset.box.upper)).all(axis=1)
-    found[found] = are_feasible(eset.constraints, z[found], p[found])
-    return States(structure, z[found], p[found])
 
 
 def _on_lines(eset: EquilibriumSet, generator: np.random.Generator) -> Pools:

@@ -12,27 +12,28 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from equimorph.arrays import Flags, Items, Lanes, Numbers, Values
+from equimorph.arrays import Flags, Lanes, Numbers, Values
 from equimorph.columns import Columns
 from equimorph.errors import EndlessError
 from equimorph.linalg.lanes import over_lanes
 from equimorph.manifold.geometry.points import VertexKind
 from equimorph.manifold.lifting.edges import LONGEST, Excess, correct_ends, trace_rays
+from equimorph.manifold.lifting.endless import (
+    REPEATED,
+    are_repeated,
+    named_point,
+    refuse_turns,
+)
 from equimorph.manifold.lifting.hiding_edges import BothEnds, hiding_edges
 from equimorph.manifold.lifting.kernels import flag_first_of_alike, match_rays
 from equimorph.manifold.lifting.pairing import Pairing, RayMark, Rays
 from equimorph.marching.kernels import LEAST_COSINE, MULTIPLIER_WEIGHT
-from equimorph.model import Progress, are_feasible
-from equimorph.tolerances import SAME_STATE
+from equimorph.model import Progress
 
 CHUNK = 4096
 """Rays that are traced together: this bounds the memory."""
 ENDLESS = 250
 """Number of equilibria over one point beyond which the set is refused: it may be unbounded."""
-REPEATED, FURTHER = 6, 100
-"""Times that whole turns repeat a state over one point from which on the set is refused, if it may
-turn so many times further."""
-TURN = 2.0 * np.pi
 REACH = 0.1
 """Distance of a known point from where it is predicted, over the step, up to which the ray ends
 there; Newton's method may go 0.25 in its first correction, and from one end only."""
@@ -95,46 +96,15 @@ def _refuse_endless(pairing: Pairing) -> None:
     sheets = np.bincount(vertex + 1, minlength=2)[1:]  # −1: over none
     if sheets.max() < REPEATED:
         return
-    p = setting.parameters(pairing.mesh.vertices[sheets.argmax()][None])[0, setting.free]
-    names = [setting.structure.parameters[place].name for place in setting.free]
-    point = ", ".join(f"{name} = {value:g}" for name, value in zip(names, p, strict=True))
-    if _repeats(pairing, np.flatnonzero(vertex == sheets.argmax())):
-        raise EndlessError(
-            f"`within` must bound whole turns: over {point} they repeat a state {REPEATED} times, "
-            "and without end. Bound a descriptor that grows with them: an angle, or the rotation "
-            "of a member that is hinged at both ends."
-        )
+    p = setting.parameters(pairing.mesh.vertices[sheets.argmax()][None])[0]
+    if are_repeated(setting, store.z[np.flatnonzero(vertex == sheets.argmax())], p):
+        refuse_turns(setting, p)
     if sheets.max() > ENDLESS:
         raise EndlessError(
             f"`within` must leave at most {ENDLESS} equilibria over a point; got more over "
-            f"{point}. Bound a descriptor: one that grows with the turns of an endless set, "
-            "or displacements if the structure has that many states."
+            f"{named_point(setting, p)}. Bound a descriptor: one that grows with the turns of an "
+            "endless set, or displacements if the structure has that many states."
         )
-
-
-def _repeats(pairing: Pairing, points: Items) -> bool:
-    """Whether points over one vertex are one state but for whole turns, and more turns are allowed.
-
-    It differs from its copies by multiples of 2π in some unknowns. See docs/decisions.md, "Whole
-    turns that no constraint bounds are refused early".
-    """
-    structure, constraints = pairing.setting.structure, pairing.setting.constraints
-    z, p = pairing.points.z[points], pairing.points.p[points]
-    if not np.ptp(z[:, : structure.unknowns], axis=0).max() > (REPEATED - 2) * TURN:
-        return False
-    for own in range(len(z)):
-        apart = z - z[own]
-        turned = np.rint(apart / TURN)
-        turned[:, structure.unknowns :] = 0.0
-        copies = np.abs(apart - TURN * turned).max(axis=1) < SAME_STATE
-        if copies.sum() < REPEATED:
-            continue
-        axis = np.abs(turned[copies]).max(axis=0).argmax()
-        if len(np.unique(turned[copies, axis])) >= REPEATED:
-            furthest = np.flatnonzero(copies)[np.abs(turned[copies, axis]).argmax()]
-            beyond = z[own] + TURN * FURTHER * turned[[furthest]]
-            return bool(are_feasible(constraints, beyond, p[[own]])[0])
-    return False
 
 
 def _one_of_each_pair(pairing: Pairing, rays: Rays) -> Rays:
