@@ -254,6 +254,23 @@ def test_known_solutions_are_avoided():
     assert np.allclose(sorted(roots), [-1.0, 0.0, 1.0], atol=1e-12)
 
 
+def test_a_known_solution_at_which_a_lane_begins_is_found_again():
+    """x³ = x from x = 1: there is no side to which it could be pushed."""
+    form = Polynomial(lambda x, a: x**4 * 0.25 - x**2 * 0.5 + 0.0 * a, 1, ("a",))
+    start, p = np.array([[1.0]]), np.zeros((1, 1))
+    found = settle(form, start, p, guards=Guards(known=np.array([[[1.0], [-1.0]]])))
+    assert found.found[0]
+    assert found.z[0, 0] == pytest.approx(1.0, abs=1e-12)
+
+
+def test_a_lane_pushed_without_end_is_singular():
+    """Of (1 + 1/x²) x from x = 1 on: the derivative vanishes, and nothing else is there."""
+    form = Polynomial(lambda x, a: x**2 * 0.5 + 0.0 * a, 1, ("a",))
+    guards = Guards(known=np.zeros((1, 1, 1)))
+    found = settle(form, np.array([[1.0]]), np.zeros((1, 1)), guards=guards)
+    assert found.status[0] == Status.SINGULAR
+
+
 def test_rows_of_nan_stand_for_no_known_solution():
     form = Polynomial(lambda x, a: x**4 * 0.25 - x**2 * 0.5 + 0.0 * a, 1, ("a",))
     start, p = np.array([[0.9], [1.3]]), np.zeros((2, 1))

@@ -6,6 +6,7 @@ import pytest
 import equimorph as em
 from equimorph.errors import EndlessError
 from equimorph.manifold.lifting import flood
+from equimorph.manifold.lifting.endless import refuse_copies
 from typecheck import unchecked
 
 
@@ -47,6 +48,58 @@ def test_a_state_that_whole_turns_repeat_as_often_as_a_bound_lets_them_is_lifted
     true = np.concatenate([own, other])
     true = true[np.abs(true) <= 25.0]
     np.testing.assert_allclose(np.sort(turned), np.sort(true), atol=1e-9)
+
+
+def winding_in(angle: em.Unknown) -> em.EnergyStructure:
+    """A pendulum that does not wind as |p| < 1; its load does no work in turns."""
+    load = em.Parameter("p", "1", 1.0, "load")
+    return em.EnergyStructure(f"-cos({angle.name}) - p*sin({angle.name})", [angle], [load])
+
+
+def turned(eset, turns: int) -> em.States:
+    """States of a set, with their first unknown changed by whole turns."""
+    z = eset.points.z.copy()
+    z[:, 0] += 2.0 * np.pi * turns
+    return em.States(eset.structure, z, eset.points.p)
+
+
+@pytest.mark.parametrize("turns", [1, -2])
+def test_one_copy_that_a_check_finds_is_enough_where_more_turns_lead_to_more(turns, monkeypatch):
+    """tan θ = p: after six turns and a hundred, states are equilibria as before."""
+    monkeypatch.setattr(flood, "are_repeated", lambda *_: False)
+    winding = winding_in(em.Unknown("theta", "0"))
+    angle = em.Descriptor("angle", "1", lambda z, p: np.abs(z[:, 0]))
+    given = {"box": em.Box(p=(-0.5, 0.5)), "intervals": (3,), "checks": 0}
+    with unchecked():
+        eset = em.equilibrium_set(winding, **given)
+        bounded = em.equilibrium_set(winding, **given, within=[angle <= 30.0])
+        said = r"`within` must bound whole turns: over p = .* 6 times, and without end"
+        with pytest.raises(EndlessError, match=said):
+            refuse_copies(eset, turned(eset, turns))
+        refuse_copies(bounded, turned(bounded, turns))
+
+
+def test_states_a_turn_apart_are_no_copies_where_further_turns_lead_to_none():
+    """(x − p)(x − p − π)(x − p − 2π) has three roots, the first and the last a turn apart."""
+    load = em.Parameter("p", "1", 1.0, "load")
+    t = "(x - p)"
+    energy = f"{t}**4/4 - pi*{t}**3 + pi**2*{t}**2"
+    roots = em.EnergyStructure(energy, [em.Unknown("x", "p", guesses=(-1.0, 7.5))], [load])
+    with unchecked():
+        eset = em.equilibrium_set(roots, em.Box(p=(-0.5, 0.5)), intervals=(3,))
+        refuse_copies(eset, turned(eset, 1))
+    assert eset.audit.clean
+    assert eset.audit.components == 3
+
+
+def test_copies_that_are_no_other_states_are_not_refused():
+    """Of an angle with a period, a set has one copy."""
+    winding = winding_in(em.Unknown("theta", "0", period=2.0 * np.pi))
+    with unchecked():
+        eset = em.equilibrium_set(winding, em.Box(p=(-0.5, 0.5)), intervals=(3,))
+        refuse_copies(eset, turned(eset, 1))
+    assert eset.audit.clean
+    assert eset.audit.components == 2
 
 
 def test_a_set_larger_than_its_limit_is_returned_as_far_as_it_is_known():

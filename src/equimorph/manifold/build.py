@@ -106,9 +106,9 @@ def equilibrium_set(  # noqa: PLR0913  # the knobs of the public face, most by k
         Random points, half of them below the set, half anywhere in the box, at which an independent
         search looks for equilibria that the set lacks; four times as many in diagrams over one
         parameter and in symmetric slices. In addition, Newton's method starts from 2000 random
-        states, each over a different point. Equilibria found in this way are lifted like seeds and
-        new points are checked, until nothing is missing at all points or ten rounds are over. Of
-        more than two points a quarter is checked first. 0 disables all checks.
+        states, each over a different point, and beside what these lead to. What is found in this
+        way is lifted like seeds, and new points are checked, until nothing is missing or ten rounds
+        are over. Of more than two points a quarter is checked first. 0 disables all checks.
     accuracy
         Largest distance of the straight cells from the set, in the metric, to which the set is
         refined (see `refine`); without it, the set is not refined. If some edges cannot be bisected
@@ -234,7 +234,7 @@ def _complete(
             found = Check(0, eset.points[:0])
             break
         points = _checks(effort.checks, order.setting)
-        found = check(eset, generator, points, islands, order.progress)
+        found = check(eset, generator, points, islands, order.progress, lacked=recovered > 0)
         lacking = len(found.missing)
         refuse_copies(eset, found.missing)
         if lacking == 0 or number == SEARCHES - 1:

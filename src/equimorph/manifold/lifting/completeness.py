@@ -35,6 +35,8 @@ FIRST, FIRST_OF = 2, 4
 takes three quarters of the time of two."""
 SCATTERED = 2000
 """Random points with one random guess each, from which Newton starts in addition to searches."""
+PUSHED = 300
+"""Guesses that are pushed on in sets that lacked nothing, at most."""
 
 
 @dataclass(frozen=True)
@@ -77,13 +79,16 @@ def check(
     points: int,
     islands: IslandFinder,
     progress: Progress,
+    *,
+    lacked: bool = False,
 ) -> Check:
     """Search at random points, half of them anywhere in the box, half below the set.
 
     Thoroughly at `points`, and from one guess each at `SCATTERED` others: so pieces over a small
     part of the box are seen, too. If something is missing at the first points or elsewhere, the
     other points wait, and so do guesses that are pushed on: the set that is lifted from it is
-    checked again. So the last check has searched everywhere, unless it says what is missing.
+    checked again. So the last check has searched everywhere, unless it says what is missing. A set
+    that `lacked` something may lack more: all guesses are pushed on.
     """
     progress.report("independent checks", 0, points)
     chosen = [
@@ -101,7 +106,8 @@ def check(
     found = found.joined(_elsewhere(eset, scattered, seed, islands))
     if len(found.missing):
         return found
-    found = found.joined(_led_to(eset, push_on(eset, scattered.arrivals)))
+    pushed = push_on(eset, scattered.arrivals, SCATTERED if lacked else PUSHED)
+    found = found.joined(_led_to(eset, pushed))
     if len(found.missing) or len(places) <= first:
         return found
     progress.report("independent checks", first, points)

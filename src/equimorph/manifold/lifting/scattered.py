@@ -22,11 +22,9 @@ PER_FREE = 4
 """Number of guesses per guess that is corrected with the parameters free as well."""
 ITERATIONS = 40
 """Of Newton's method from guesses, at most."""
-PUSHED = 500
-"""Guesses that are pushed on, at most."""
 PUSHES = 3
-"""Times that each of these is pushed on."""
-NUDGE = 0.05
+"""Times that a guess is pushed on."""
+NUDGE = 0.02
 """Part of the way from a state back to the guess, where deflated Newton begins: at the state itself
 it has no direction."""
 DEFLATED = 30
@@ -83,13 +81,13 @@ def scatter(eset: EquilibriumSet, count: int, generator: np.random.Generator) ->
     return Scattered(found, Arrivals(guess[led], fixed.z[led], p[led], met))
 
 
-def push_on(eset: EquilibriumSet, arrivals: Arrivals) -> States:
+def push_on(eset: EquilibriumSet, arrivals: Arrivals, most: int) -> States:
     """States to which guesses lead that are pushed on, over the box and within the constraints.
 
-    First those that led beyond the constraints: what is asked for may have kept them from it.
+    At most so many guesses are, first those that led to what is not asked for.
     """
     beyond = ~are_feasible(eset.constraints, arrivals.z, arrivals.p)
-    here = arrivals.take(np.argsort(~beyond, kind="stable")[:PUSHED])
+    here = arrivals.take(np.argsort(~beyond, kind="stable")[:most])
     found = [eset.points[:0]]
     for _ in range(PUSHES):
         here = here.pushed(eset.structure)
