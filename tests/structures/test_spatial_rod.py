@@ -149,21 +149,24 @@ def test_the_stable_pair_beside_the_plane_has_its_energy():
 
 
 @pytest.mark.parametrize("load", [0.3, 0.8])
-@pytest.mark.parametrize("seed", [0, 1, 2])
-def test_a_cantilever_that_is_bent_back_is_found(load, seed):
+def test_a_cantilever_that_is_bent_back_is_found(load):
     """A strip under a dead load across its tip has all three states of the planar rod.
 
-    Of guesses that turn about all axes one in 3000 leads to the second of these.
+    In nine of ten searches at least: one guess in fifty leads to the second state. With guesses
+    that turn about all axes, and steps of 0.7, it was one in 3000.
     """
     ends, tip, bound = ("clamped", "free"), {"P": em.PointForce(1.0)}, 18.0
     rod = em.SpatialRod(torsion=0.8, lateral=3.0, ends=ends, loads=tip).resolving(bound)
     planar = em.Rod(ends=ends, loads=tip).resolving(bound)
     flat = em.find_equilibria(planar, {"P": load}, within=[planar.max_curvature <= bound])
-    found = em.find_equilibria(rod, {"P": load}, seed=seed, within=[rod.max_curvature <= bound])
-    tips = rod.shape(found.z, found.p)[:, -1]
-    inside = np.abs(tips[:, 2]) < 1e-6
+    heights, complete = np.sort(planar.height(1.0)(flat)), 0
     assert len(flat) == 3
-    assert np.sort(tips[inside, 1]) == pytest.approx(np.sort(planar.height(1.0)(flat)), abs=1e-6)
+    for seed in range(10):
+        found = em.find_equilibria(rod, {"P": load}, seed=seed, within=[rod.max_curvature <= bound])
+        tips = rod.shape(found.z, found.p)[:, -1]
+        inside = np.sort(tips[np.abs(tips[:, 2]) < 1e-6, 1])
+        complete += len(inside) == 3 and bool(np.abs(inside - heights).max() < 1e-6)
+    assert complete >= 9
 
 
 @pytest.mark.parametrize("direction", [(-0.6, 0.8), (-1.0, 0.0)])

@@ -44,6 +44,8 @@ HOMOTOPIES = 0.05
 """Share of the guesses from which Newton homotopy starts (where Newton found nothing)."""
 MEANS = 3
 """Known states of which guesses between them are means."""
+DISTANCE = 28.0
+"""Length in the metric from a random guess that Newton's steps may cover."""
 NUDGE = 0.1
 """Part of the way from an equilibrium to a random guess, where deflated Newton starts."""
 WIDE_STEPS = TraceOptions(
@@ -58,6 +60,12 @@ WIDE_STEPS = TraceOptions(
     retries=0,
 )
 """Coarse steps through everything: a lane that jumps to another branch does no harm here."""
+
+
+def from_afar(structure: Structure) -> Guards:
+    """Return the guards of Newton's method from random guesses."""
+    longest = structure.longest_step
+    return Guards(iterations=round(DISTANCE / longest), longest=longest)
 
 
 @dataclass(frozen=True)
@@ -134,7 +142,7 @@ class Pools:
         for k, special in enumerate(structure.special_guesses(self.ground.p)[:guesses]):
             good = structure.resolved(special, self.ground.p)
             guess[np.flatnonzero(number == k)[good]] = special[good]
-        near = settle(structure, guess, p, guards=Guards(iterations=40))
+        near = settle(structure, guess, p, guards=from_afar(structure))
         found = near.found
         self.failures.append(("Newton did not converge", group[~found]))
         led = self._take(near.z[found], group[found])

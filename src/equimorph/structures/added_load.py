@@ -63,7 +63,7 @@ class Pushed(Structure):
         self._base, self._along, self._step = structure, along, DIFFERENCE * reach
         self.unknowns, self.constraints = structure.unknowns, structure.constraints
         self.mass, self.energy_scale = structure.mass, structure.energy_scale
-        self.unresolved = structure.unresolved
+        self.unresolved, self.longest_step = structure.unresolved, structure.longest_step
         unit = structure.effort_unit(Parameter(PUSH, along.unit, 1.0, "load"))
         self.parameters = (*structure.parameters, Parameter(PUSH, unit, scale, "load", 0.0))
 

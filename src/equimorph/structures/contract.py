@@ -118,6 +118,8 @@ class Structure(Rebuilt, Inertial):
     """Axis, y or z, that is upward in pictures of a structure in space."""
     unresolved: str = "the discretisation does not resolve the state: refine it"
     """What is told where states are not `resolved`, and what helps there."""
+    longest_step: float = 0.7
+    """Length in the metric to which steps of Newton's method from random guesses are shortened."""
     energy_scale: float = 1.0
     """Value of one unit of `energy` in the units of the parameters, in joules for example."""
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from equimorph.arrays import Float, Items, Lanes, Parameters
 from equimorph.columns import Columns
+from equimorph.equilibria.random_search import from_afar
 from equimorph.equilibria.settle import Guards, free_directions, settle
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.model import are_feasible
@@ -20,8 +21,6 @@ from equimorph.structures import States, Structure
 
 PER_FREE = 4
 """Number of guesses per guess that is corrected with the parameters free as well."""
-ITERATIONS = 40
-"""Of Newton's method from guesses, at most."""
 PUSHES = 3
 """Times that a guess is pushed on."""
 NUDGE = 0.02
@@ -70,7 +69,7 @@ def scatter(eset: EquilibriumSet, count: int, generator: np.random.Generator) ->
     """
     structure, free, box = eset.structure, eset.setting.free, eset.box
     p = eset.setting.parameters(generator.uniform(box.lower, box.upper, (count, len(free))))
-    guess, guards = structure.sample(p, generator), Guards(iterations=ITERATIONS)
+    guess, guards = structure.sample(p, generator), from_afar(structure)
     fixed = settle(structure, guess, p, guards=guards)
     some, led = slice(0, count // PER_FREE), fixed.found
     directions = free_directions(structure, free, len(p[some]))

@@ -24,6 +24,7 @@ from equimorph.structures.space_frame.mechanics import SpatialFrameMechanics
 from equimorph.structures.space_frame.member import SpatialMemberSpec, SpatialSupportSpec
 from equimorph.structures.space_frame.model import SpatialFrameModel
 from equimorph.structures.space_frame.network import spatial_network
+from equimorph.structures.spatial.quaternions import LONGEST_STEP
 from equimorph.structures.unit_system import Units, unit_system
 
 
@@ -287,6 +288,7 @@ class SpatialFrame(DescribedSpatialFrame):
     """
 
     kind: ClassVar[str] = "spatial frame"
+    longest_step = LONGEST_STEP
     upward: ClassVar[str] = "z"
     finds_orbits: ClassVar[bool] = True
 

@@ -42,10 +42,12 @@ WHOLE_TURNS = np.array([0.0, -1.0, 1.0, -2.0, 2.0])
 FORCES = 8.0
 """Spread of the support forces of random guesses."""
 
-BENDINGS = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 1.0, 1.0], [1.0, 1.0, 1.0]])
-"""Axes t, n, b about which random guesses turn: two kinds bend in a plane."""
-FORCES_OF_BENDINGS = np.array([[1.0, 0.0, 1.0], [1.0, 1.0, 0.0], [1.0, 1.0, 1.0], [1.0, 1.0, 1.0]])
-"""Directions x, y, z of their support forces."""
+IN_A_PLANE = [(0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, 1.0)]
+BENDINGS = np.array([*IN_A_PLANE, *3 * [(1.0, 1.0, 1.0)]])
+"""Axes t, n, b about which random guesses of some kinds turn: half of them bend in a plane, most of
+these in that of the drawing."""
+FORCES_OF_BENDINGS = np.where(BENDINGS.sum(axis=1, keepdims=True) > 1.0, 1.0, 1.0 - BENDINGS)
+"""Directions x, y, z of their support forces: all, or those in the plane."""
 
 Nodes = Float[np.ndarray, "lanes nodes 4"]
 
@@ -207,7 +209,7 @@ class SpatialLagrangian(RodMechanics):
     def sample(self, p: Parameters, generator: np.random.Generator) -> Lanes:
         """Rotations between those of the ends, turned by random waves, with random multipliers.
 
-        About all axes of the cross-sections, or in half of the guesses only about n or b, under
+        About all axes of the cross-sections, or in half of the guesses only about b or n, under
         forces in the plane of bending: states that stay in a plane are common, and of the other
         guesses one in thousands leads to some of them.
         """

@@ -15,6 +15,9 @@ from equimorph.arrays import Flags, Float, Int, Lanes
 Quaternions = Float[np.ndarray, "... 4"]
 Jet = Float[np.ndarray, "parts ..."]
 
+LONGEST_STEP = 0.1
+"""Length of Newton's steps from random guesses. The energy of bending is no quadratic function of
+quaternions: steps of 0.7 led nearly all guesses of rods to one of many states, or to none."""
 LEAST = 1e-12
 """Length of a quaternion that has no direction."""
 

@@ -32,7 +32,7 @@ from equimorph.structures.spatial.natural import (
 )
 from equimorph.structures.spatial.orbits import OrbitMechanics
 from equimorph.structures.spatial.phase import PinnedMechanics
-from equimorph.structures.spatial.quaternions import with_unit_rotations
+from equimorph.structures.spatial.quaternions import LONGEST_STEP, with_unit_rotations
 from equimorph.structures.states import State
 from equimorph.structures.unit_system import Quantity, Units
 
@@ -132,6 +132,7 @@ class SpatialRod(DescribedInSpace):
     """
 
     kind: ClassVar[str] = "spatial rod"
+    longest_step = LONGEST_STEP
     smallest_wave: ClassVar[float] = SMALLEST_IN_SPACE
 
     @check_arguments
