@@ -18,7 +18,7 @@ from equimorph.structures.frame.model import FrameModel
 from equimorph.structures.frame.network import AXES, MemberSpec, SupportSpec, frame_network
 from equimorph.structures.frame.patterns import Actuators, Loads
 from equimorph.structures.network import Joints
-from equimorph.structures.resolution import SMALLEST_WAVE
+from equimorph.structures.resolution import IN_PLANE, Waves
 from equimorph.structures.rod.fibres import Stressed
 from equimorph.structures.unit_system import Units, unit_system
 
@@ -26,7 +26,7 @@ from equimorph.structures.unit_system import Units, unit_system
 class DescribedFrame(FrameFields):
     """A planar frame with its descriptors, in the user's units."""
 
-    smallest_wave: ClassVar[float] = SMALLEST_WAVE
+    waves: ClassVar[Waves] = IN_PLANE
     written: ClassVar[Written] = {
         "displacement(joint,axis)": "displacement",
         "rotation(joint)": "rotation",

@@ -11,7 +11,7 @@ from equimorph.arrays import Flags, Float, Lanes, Parameters, Values
 from equimorph.errors import InputError
 from equimorph.model import Drawing, Parameter
 from equimorph.structures.contract import Growth
-from equimorph.structures.resolution import SMALLEST_WAVE
+from equimorph.structures.resolution import IN_PLANE, Waves
 from equimorph.structures.rod.any_rod import AnyRod
 from equimorph.structures.rod.clamped import ClampedMechanics
 from equimorph.structures.rod.description import PlanarDescription
@@ -158,7 +158,7 @@ class Rod(Described):
     """
 
     kind: ClassVar[str] = "rod"
-    smallest_wave: ClassVar[float] = SMALLEST_WAVE
+    waves: ClassVar[Waves] = IN_PLANE
 
     @check_arguments
     def __init__(  # noqa: PLR0913  # what a rod can have

@@ -17,7 +17,7 @@ from equimorph.structures.discrete import continue_equilibria
 from equimorph.structures.frame.images import SpatialImage, find_images
 from equimorph.structures.frame.patterns import Actuators, Loads, Patterns
 from equimorph.structures.network import Joints
-from equimorph.structures.resolution import SMALLEST_IN_SPACE
+from equimorph.structures.resolution import IN_SPACE, Waves
 from equimorph.structures.rod.fibres import Stressed
 from equimorph.structures.space_frame.fields import SpatialFrameFields
 from equimorph.structures.space_frame.mechanics import SpatialFrameMechanics
@@ -81,7 +81,7 @@ SECTION = ("t", "n", "b")
 class DescribedSpatialFrame(SpatialFrameFields):
     """A frame in space with its descriptors, in the user's units."""
 
-    smallest_wave: ClassVar[float] = SMALLEST_IN_SPACE
+    waves: ClassVar[Waves] = IN_SPACE
     written: ClassVar[Written] = {
         "displacement(joint,axis)": "displacement",
         "place(joint,axis)": "place",

@@ -11,7 +11,7 @@ from equimorph.arrays import Flags, Float, Lanes, Parameters, Values
 from equimorph.errors import InputError
 from equimorph.model import Drawing, parameter_vector
 from equimorph.structures.discrete import correct_at_parameters
-from equimorph.structures.resolution import SMALLEST_IN_SPACE
+from equimorph.structures.resolution import IN_SPACE, Waves
 from equimorph.structures.rod.discretisation import ElementCount
 from equimorph.structures.rod.drawing import ENDS, rod_drawing, rod_supports
 from equimorph.structures.rod.mechanics import SAMPLES, discretisation_error
@@ -133,7 +133,7 @@ class SpatialRod(DescribedInSpace):
 
     kind: ClassVar[str] = "spatial rod"
     longest_step = LONGEST_STEP
-    smallest_wave: ClassVar[float] = SMALLEST_IN_SPACE
+    waves: ClassVar[Waves] = IN_SPACE
 
     @check_arguments
     def __init__(  # noqa: PLR0913  # what a rod can have
