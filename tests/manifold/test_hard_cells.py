@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from equimorph.array_types import Float
-from equimorph.manifold import equilibrium_set
+from equimorph.manifold import build, equilibrium_set
 from equimorph.manifold.lifting import cells
 from equimorph.manifold.lifting.cells import areas_over
 from equimorph.model import Box, Parameter
@@ -15,6 +15,7 @@ from equimorph.structures import EnergyStructure, Rod, Unknown
 from equimorph.study.prepare import prepare
 from equimorph.study.problem import parse_study
 from oracles.complexes import assert_faithful
+from oracles.rods import inflated_rod
 from sets import arch_set
 from typecheck import unchecked
 
@@ -151,6 +152,30 @@ def test_tongues_that_join_others_only_beyond_the_box_are_met(seed):
     known = {(0.782, 0.02): 29, (0.8, 0.01): 29, (0.82, 0.005): 29, (0.82, 0.03): 19}
     for (theta, delta), count in known.items():
         assert len(eset.at(Theta=theta, Delta=delta)) == count
+
+
+@pytest.mark.parametrize("intervals", [(2, 4), (3, 5)])
+def test_sheets_of_waves_that_lie_over_a_corner_of_the_box_are_met_at_once(intervals, monkeypatch):
+    """Lines lead from each of them to the next one only, and one check meets them all.
+
+    The ends of the rod are 0.9856 of its length apart in the corner, 0.89 in the next one.
+    """
+    monkeypatch.setattr(build, "SEARCHES", 2)
+    rod, _, _ = inflated_rod(elements=8, degree=9)
+    with unchecked():
+        eset = equilibrium_set(
+            rod,
+            Box(nu=(0.8, 0.8774), rise=(-0.2, 0.4489)),
+            fixed={"theta_A": 0.4738, "p": 1.0164, "q": 0.1842},
+            within=[rod.max_curvature <= 11.0],
+            intervals=intervals,
+        )
+        over = eset.at(nu=0.8774, rise=0.4489)
+    assert eset.audit.clean
+    # two of each index from one on, but for those at which waves begin and end
+    counts = np.bincount([each.index for each in over])
+    assert (counts[3:-1] == 2).all()
+    assert len(over) == 23
 
 
 def test_what_the_discretisation_does_not_resolve_is_told_to_be_left_out():

@@ -37,6 +37,9 @@ SCATTERED = 2000
 """Random points with one random guess each, from which Newton starts in addition to searches."""
 PUSHED = 300
 """Guesses that are pushed on in sets that lacked nothing, at most."""
+RUNGS, LINES = 40, 3
+"""Times that lines are laid through states that lines met and the set lacks, at most; lines through
+each."""
 
 
 @dataclass(frozen=True)
@@ -192,14 +195,27 @@ def _on_lines(eset: EquilibriumSet, generator: np.random.Generator) -> Pools:
     """Vertices of all strata, and what random lines through them meet over the same points.
 
     Lines in all actuators and loads are followed both ways through folds, beyond the box: sheets
-    that hang together there and are narrow inside it are met from those beside them.
+    that hang together there and are narrow inside it are met from those beside them. Each leads to
+    the next one, so that lines begin at what the set lacks, too, until they meet nothing new.
+
+    See docs/decisions.md, "Sheets in a corner are climbed like a ladder".
     """
     anywhere = range(eset.structure.size + 1)
     vertices = [own for _, own in spread_over_strata(eset, anywhere)]
     chosen = np.concatenate([np.zeros(0, int), *vertices])
     lanes, states = np.arange(len(chosen)), eset.points[chosen]
     pools = Pools(Ground(eset.structure, states.p, eset.constraints), generator, states.z, lanes)
+    known = len(lanes)
     pools.lay_lines(lanes)
+    for _ in range(RUNGS):
+        z, group = pools.z[known:], pools.group[known:]
+        good = np.flatnonzero(pools.ground.excess(z, group) <= 0.0)
+        met = States(eset.structure, z[good], pools.ground.p[group[good]])
+        new = known + good[_are_lacking(met, eset)]
+        if len(new) == 0:
+            break
+        known = len(pools.z)
+        pools.lay_lines(np.repeat(new, LINES))
     return pools
 
 
@@ -231,14 +247,19 @@ def _belonging(eset: EquilibriumSet, states: States) -> States:
 
 
 def _lacking(found: States, eset: EquilibriumSet) -> States:
-    """Those of the states, each over its own point, that a set lacks; copies of them will do."""
-    structure, turns = eset.structure, eset.structure.whole_turns
-    found = States(structure, turns.taken_back(found.z), found.p)
-    lacking = found[np.flatnonzero(~eset.holding(found)[0])]
-    for turn in (*turns.free, *-turns.free):
+    """Those of the states, each over its own point, that a set lacks; see `_are_lacking`."""
+    back = States(eset.structure, eset.structure.whole_turns.taken_back(found.z), found.p)
+    return back[_are_lacking(back, eset)]
+
+
+def _are_lacking(states: States, eset: EquilibriumSet) -> Int[np.ndarray, " some"]:
+    """Places of those of some states that a set lacks; copies of them will do."""
+    lacking = np.flatnonzero(~eset.holding(states)[0])
+    turns = eset.structure.whole_turns.free
+    for turn in (*turns, *-turns):
         if len(lacking):
-            turned = States(structure, lacking.z + turn, lacking.p)
-            lacking = lacking[np.flatnonzero(~eset.holding(turned)[0])]
+            turned = States(eset.structure, states.z[lacking] + turn, states.p[lacking])
+            lacking = lacking[~eset.holding(turned)[0]]
     return lacking
 
 
