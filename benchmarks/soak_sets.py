@@ -21,8 +21,9 @@ import subprocess
 import sys
 import time
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -85,6 +86,9 @@ CAPS = {
 }
 """Bounds of the curvature of frames, by name of the specimen."""
 CAPS_OF_RODS = (8.0, 24.0)
+PLACES, FARTHEST = ("nu", "rise", "sideways"), 0.99
+"""Parameters that hold the ends of a rod apart, and the largest distance for which it has elements:
+beyond it waves become flat without end."""
 ANGLES, SHORTENINGS, HALF = (1.5, 3.5), (0.05, 0.5), 0.5
 """Bounds of the angles of a chain, of shortenings, and the share of trusses that have one."""
 WIDE, MOST = 0.5, 0.7
@@ -142,8 +146,19 @@ def _range(specimen: Specimen, name: str) -> tuple[float, float]:
     return centre - AROUND, centre + AROUND
 
 
+def _reach(structure: Rod | SpatialRod, sides: Mapping[str, Sequence[float]]) -> float | None:
+    """How far apart both ends of a rod are held, at most; None if they may move.
+
+    `sides`: values of each parameter between which it lies.
+    """
+    held = [each for each in PLACES if each in sides]
+    if len(held) < (3 if isinstance(structure, SpatialRod) else 1) or held[0] != "nu":
+        return None
+    return min(max(map(np.linalg.norm, product(*(sides[each] for each in held)))), FARTHEST)
+
+
 def _bounded(
-    specimen: Specimen, generator: np.random.Generator
+    specimen: Specimen, sides: Mapping[str, Sequence[float]], generator: np.random.Generator
 ) -> tuple[Structure, tuple[Constraint, ...]]:
     """The structure under a cap of its curvature, with the elements that this needs, or others.
 
@@ -153,7 +168,8 @@ def _bounded(
     structure, share = specimen.structure, generator.random()
     if isinstance(structure, Rod | SpatialRod | Frame | SpatialFrame):
         bound = round(_share(CAPS.get(specimen.name, CAPS_OF_RODS), share), 2)
-        fine = structure.resolving(bound)
+        held = isinstance(structure, Rod | SpatialRod)
+        fine = structure.resolving(bound, _reach(structure, sides) if held else None)
         return fine, (fine.max_curvature <= bound,)
     return structure, _within(specimen, share)
 
@@ -195,7 +211,8 @@ def question(number: int) -> Question:
         zero = low <= 0.0 <= high and generator.random() < SYMMETRIC
         if name not in sides:
             fixed[name] = 0.0 if zero else round(generator.uniform(low, high), 4)
-    structure, within = _bounded(specimen, generator)
+    values = {name: (value,) for name, value in fixed.items()}
+    structure, within = _bounded(specimen, sides | values, generator)
     fewest, most = INTERVALS[d]
     intervals = tuple(generator.integers(fewest, most + 1, d).tolist())
     return Question(specimen.name, structure, Box(**sides), fixed, within, intervals)
