@@ -17,7 +17,7 @@ Jet = Float[np.ndarray, "parts ..."]
 
 LONGEST_STEP = 0.1
 """Length of Newton's steps from random guesses. The energy of bending is no quadratic function of
-quaternions: steps of 0.7 led nearly all guesses of rods to one of many states, or to none."""
+quaternions; see docs/decisions.md, "Newton's steps from random guesses are short in space"."""
 LEAST = 1e-12
 """Length of a quaternion that has no direction."""
 
