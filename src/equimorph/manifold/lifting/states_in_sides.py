@@ -10,15 +10,14 @@ import numpy as np
 
 from equimorph.arrays import Flags, Int, Lanes, Parameters, Place
 from equimorph.equilibria.critical import Critical, null_border
-from equimorph.equilibria.settle import Guards, free_directions, settle
+from equimorph.equilibria.random_search import from_afar
+from equimorph.equilibria.settle import free_directions, settle
 from equimorph.manifold.complex.equilibrium_set import EquilibriumSet
 from equimorph.model import Box, are_feasible
 from equimorph.structures import States, join_states
 from equimorph.structures.metric import metric_length
 from equimorph.tolerances import SAME_SOLUTION
 
-ITERATIONS = 40
-"""Of Newton's method from random guesses, at most."""
 Face = tuple[Int[np.ndarray, " k"], Place]
 """Parameters that are constant on a side, an edge or a corner, and their values."""
 
@@ -36,8 +35,7 @@ def states_in_sides(eset: EquilibriumSet, count: int, generator: np.random.Gener
         starts = [_guesses(eset, face, each, generator) for face in faces]
         p, guess, moving = (np.concatenate(column) for column in zip(*starts, strict=True))
         directions = free_directions(structure, moving, len(p)) if held < len(free) else None
-        guards = Guards(iterations=ITERATIONS)
-        at = settle(structure, guess, p, directions, guards=guards, frames=False)
+        at = settle(structure, guess, p, directions, guards=from_afar(structure), frames=False)
         good = at.found & box.holds(at.p[:, free])
         good[good] = are_feasible(eset.constraints, at.z[good], at.p[good])
         found.append(States(structure, at.z[good], at.p[good]))

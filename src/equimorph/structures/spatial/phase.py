@@ -107,11 +107,13 @@ class PinnedMechanics(SpatialMechanics):
         found.negative[below] += 1
         return found
 
+    @np.errstate(divide="ignore", invalid="ignore")
     def _hold_pairs(self, z: Lanes, p: Parameters, shift: Shift) -> tuple[Lanes, Flags]:
         """Conditions on the axis that hold one of the pair nearest to zero; if that is negative.
 
         By inverse iteration on the gradient of the condition: the mode of the pair that has it, the
-        only one of the two on which the condition depends.
+        only one of the two on which the condition depends. Lanes whose forces grow beyond all
+        bounds on the way have none, and their corrections are not finite.
         """
         n, lanes = self.unknowns, len(z)
         bare = np.concatenate([z[:, :-1], np.zeros((lanes, 1))], axis=1)
