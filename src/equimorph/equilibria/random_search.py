@@ -44,8 +44,9 @@ HOMOTOPIES = 0.05
 """Share of the guesses from which Newton homotopy starts (where Newton found nothing)."""
 MEANS = 3
 """Known states of which guesses between them are means."""
-DISTANCE = 28.0
-"""Length in the metric from a random guess that Newton's steps may cover."""
+ITERATIONS, WAY = 30, 7.0
+"""Of Newton's method from random guesses, at most: so many, and those of a way of this length in
+the metric. Where no state exists, as beyond the reach of a rod, all of them are taken."""
 NUDGE = 0.1
 """Part of the way from an equilibrium to a random guess, where deflated Newton starts."""
 WIDE_STEPS = TraceOptions(
@@ -65,7 +66,7 @@ WIDE_STEPS = TraceOptions(
 def from_afar(structure: Structure) -> Guards:
     """Return the guards of Newton's method from random guesses."""
     longest = structure.longest_step
-    return Guards(iterations=round(DISTANCE / longest), longest=longest)
+    return Guards(iterations=ITERATIONS + round(WAY / longest), longest=longest)
 
 
 @dataclass(frozen=True)
