@@ -352,7 +352,7 @@ def test_a_state_that_is_no_stable_equilibrium_is_one_line(case: str, known: She
 @pytest.mark.parametrize(
     ("old", "new", "part"),
     [
-        ('load = "uniform"', "span = 1.0", "`structure.span`"),
+        ('load = "uniform"', "span = 1.0", "in `structure`: `span` must lie between 0 and 1"),
         ('load = "uniform"', "span = 0.0", "`structure.span`"),
         ('load = "uniform"', "load = [[0, 1], [1, nan]]", "finite"),
     ],

@@ -60,7 +60,8 @@ WRONG = {
     "span too long": (
         'load = "uniform"',
         "span = 1.0",
-        r"`structure\.span` must be less than 1; got 1\.0",
+        r"in `structure`: `span` must lie between 0 and 1 \(both excluded\), the rod has length 1; "
+        r"got 1\.0",
     ),
     "span too short": (
         'load = "uniform"',

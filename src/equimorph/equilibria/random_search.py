@@ -46,7 +46,7 @@ MEANS = 3
 """Known states of which guesses between them are means."""
 ITERATIONS, WAY = 30, 7.0
 """Of Newton's method from random guesses, at most: so many, and those of a way of this length in
-the metric. Where no state exists, as beyond the reach of a rod, all of them are taken."""
+the metric. Where no state exists all of them are taken."""
 NUDGE = 0.1
 """Part of the way from an equilibrium to a random guess, where deflated Newton starts."""
 WIDE_STEPS = TraceOptions(
@@ -136,12 +136,13 @@ class Pools:
     def start(self, guesses: int) -> None:
         """Newton from random guesses, homotopy where it fails, deflation next to what was found."""
         structure = self.ground.structure
-        group = np.repeat(np.arange(len(self.ground.p)), guesses)
+        groups = np.flatnonzero(structure.in_reach(self.ground.p))
+        group = np.repeat(groups, guesses)
         p = self.ground.p[group]
         guess = structure.sample(p, self.generator)
         number = np.arange(len(group)) % guesses
-        for k, special in enumerate(structure.special_guesses(self.ground.p)[:guesses]):
-            good = structure.resolved(special, self.ground.p)
+        for k, special in enumerate(structure.special_guesses(self.ground.p[groups])[:guesses]):
+            good = structure.resolved(special, self.ground.p[groups])
             guess[np.flatnonzero(number == k)[good]] = special[good]
         near = settle(structure, guess, p, guards=from_afar(structure))
         found = near.found

@@ -165,6 +165,10 @@ class Pushed(Structure):
         """Natural states of the structure."""
         return self._base.natural(self._own(p))
 
+    def in_reach(self, p: Parameters) -> Flags:
+        """Whether there may be states of the structure."""
+        return self._base.in_reach(self._own(p))
+
     def sample(self, p: Parameters, generator: np.random.Generator) -> Lanes:
         """Guesses of the structure."""
         return self._base.sample(self._own(p), generator)

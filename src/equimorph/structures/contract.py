@@ -187,6 +187,10 @@ class Structure(Rebuilt, Inertial):
     def natural(self, p: Parameters) -> tuple[Lanes, Flags]:
         """Unloaded state from which the structure starts, and whether it was found."""
 
+    def in_reach(self, p: Parameters) -> Flags:
+        """Whether there may be states at parameters: false where supports are too far apart."""
+        return np.ones(len(p), bool)
+
     def may_be_natural(self, p: Parameters) -> Flags:
         """Whether natural states are defined at parameters; they need not exist everywhere."""
         return np.ones(len(p), bool)

@@ -12,10 +12,8 @@ from typing import Annotated, Any, Literal, Union
 from pydantic import (
     AfterValidator,
     Field,
-    ValidationInfo,
     WithJsonSchema,
     create_model,
-    field_validator,
 )
 
 from equimorph.model import Parameter
@@ -364,23 +362,13 @@ class StructureSection(Section):
     kind: str
 
 
-def _check_reach(span: Any, info: ValidationInfo) -> Any:
-    """Refuse a span that is as long as an inextensible rod."""
-    longest = info.data.get("length") or 1.0
-    texts = isinstance(span, str) or isinstance(longest, str)
-    if span is not None and not texts and info.data.get("axial") is None and not span < longest:
-        raise requirement(f"be less than {longest:g}")
-    return span
-
-
 def section_of(kind: str) -> type[StructureSection]:
     """Section of a kind of structure."""
     made = KINDS[kind]
     name, doc = made.__name__.removesuffix("Structure"), words_of(made)
     keys: dict[str, Any] = {"kind": (Literal[kind], ...), **keys_of(made, FORMS[kind])}
-    hooks: Any = {"_within_reach": field_validator("span")(_check_reach)} if kind == "rod" else {}
     section: type[StructureSection] = create_model(
-        f"{name}Section", __base__=StructureSection, __doc__=doc, __validators__=hooks, **keys
+        f"{name}Section", __base__=StructureSection, __doc__=doc, **keys
     )
     return section
 

@@ -69,9 +69,10 @@ def scatter(eset: EquilibriumSet, count: int, generator: np.random.Generator) ->
     """
     structure, free, box = eset.structure, eset.setting.free, eset.box
     p = eset.setting.parameters(generator.uniform(box.lower, box.upper, (count, len(free))))
+    p = p[structure.in_reach(p)]
     guess, guards = structure.sample(p, generator), from_afar(structure)
     fixed = settle(structure, guess, p, guards=guards)
-    some, led = slice(0, count // PER_FREE), fixed.found
+    some, led = slice(0, len(p) // PER_FREE), fixed.found
     directions = free_directions(structure, free, len(p[some]))
     freed = settle(structure, guess[some], p[some], directions, guards=guards, frames=False)
     z, over = np.concatenate([fixed.z, freed.z]), np.concatenate([fixed.p, freed.p])

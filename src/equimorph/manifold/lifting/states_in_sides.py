@@ -50,7 +50,8 @@ def _guesses(
     place = generator.uniform(box.lower, box.upper, (count, len(free)))
     place[:, held] = values
     p = eset.setting.parameters(place)
-    return p, eset.structure.sample(p, generator), np.tile(np.delete(free, held), (count, 1))
+    p = p[eset.structure.in_reach(p)]
+    return p, eset.structure.sample(p, generator), np.tile(np.delete(free, held), (len(p), 1))
 
 
 def _faces(box: Box) -> Iterator[Face]:

@@ -8,7 +8,7 @@ from typing import Any, ClassVar, Generic, TypeVar
 
 import numpy as np
 
-from equimorph.arrays import Float, Parameters, Values
+from equimorph.arrays import Flags, Float, Parameters, Values
 from equimorph.errors import InputError, suggestion
 from equimorph.model import Parameter, names_of
 from equimorph.model.parameter import Role
@@ -79,9 +79,9 @@ class RodDescription(ABC, Generic[Built, Model]):
         """Axes along which supports hold the ends."""
 
     @property
-    def opposed(self) -> set[str]:
-        """Places of end B along axes that both supports hold."""
-        return {axis.name for axis in self.axes if axis.opposed}
+    def held(self) -> set[str]:
+        """Places of end B along axes that both supports hold, without springs."""
+        return {axis.name for axis in self.axes if axis.rigid}
 
     @abstractmethod
     def build(self, elements: int, degree: int) -> Built:
@@ -97,7 +97,7 @@ class RodDescription(ABC, Generic[Built, Model]):
         `given` are span and rises as the user wrote them, by the names of the arguments, or None;
         `length` is that of the rod, as the user wrote it.
         """
-        places = {name: float(self.places[name]) for name in self.places if name in self.opposed}
+        places = {name: float(self.places[name]) for name in self.places if name in self.held}
         far = np.linalg.norm(list(places.values()))
         if self.profiles["axial"] is not None or far < self.units.value("length"):
             return
@@ -110,6 +110,18 @@ class RodDescription(ABC, Generic[Built, Model]):
             f"{', '.join(f'`{k}`' for k in told)} must {limit} the length of the rod, {reach}; got "
             f"{', '.join(got)}. A rod with `axial` stiffness may be stretched."
         )
+
+    def farthest(self, raw: str) -> float:
+        """Bound of a place of end B in the user's unit: the length, if the rod cannot stretch."""
+        bounded = raw in self.held and self.profiles["axial"] is None
+        return self.units.value(self.quantity(raw)) if bounded else np.inf
+
+    def in_reach(self, model: RodLagrangian, p: Parameters) -> Flags:
+        """Whether the ends are at most as far apart as the rod is long, or it stretches."""
+        held = [k for k, name in enumerate(model.names) if name in self.held]
+        far = np.linalg.norm(self.raw_parameters(model, p)[:, held], axis=1)
+        strains = any(self.profiles.get(name) is not None for name in ("axial", "shear"))
+        return np.asarray((far <= 1.0) | strains)
 
     # --- terms and profiles ---------------------------------------------------------------------
 

@@ -93,14 +93,15 @@ class PlanarDescription(RodDescription[Build, RodModel]):
         label, scale = units.label(quantity), units.value(quantity)
         span, rise = (float(self.places[name]) for name in ("nu", "rise"))
         if raw == "nu":
-            far = scale if self.profiles["axial"] is None else np.inf
+            far = self.farthest(raw)
             blank = Parameter(raw, label, scale, "fixed", None, -far, far)
             return Parameter(raw, label, scale, "fixed", blank.check(span), -far, far)
         if raw == "offset":
             unit = self.axes[1].unit
             return Parameter(raw, label, scale, "fixed", float(np.dot(unit, (span, rise))))
         if raw == "rise":
-            return Parameter(raw, label, scale, "fixed", rise)
+            far = self.farthest(raw)
+            return Parameter(raw, label, scale, "fixed", rise, -far, far)
         return Parameter(raw, label, scale, "actuator", 0.0)
 
     def data(self) -> dict[str, Any]:

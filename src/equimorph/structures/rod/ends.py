@@ -141,6 +141,11 @@ class Axis:
         """Whether both ends are supported in this direction: then there is a multiplier."""
         return FREE not in (self.first, self.last)
 
+    @property
+    def rigid(self) -> bool:
+        """Whether both ends are held in this direction, without a spring."""
+        return self.first == self.last == HELD
+
 
 def support_axes(ends: tuple[End, End]) -> tuple[Axis, Axis]:
     """x and y, or the direction along which an end slides and the one across it."""

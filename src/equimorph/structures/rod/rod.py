@@ -290,6 +290,12 @@ class Rod(Described):
         natural = self._natural(p)
         return natural.z, natural.outcome == Outcome.FOUND
 
+    def in_reach(self, p: Parameters) -> Flags:
+        """Whether the ends are at most as far apart as the rod is long, or it stretches."""
+        if self._general is None:
+            return np.asarray(np.abs(p[:, 3]) <= 1.0)
+        return self._general.in_reach(self._raw.model, p)
+
     def may_be_natural(self, p: Parameters) -> Flags:
         """Θ > 0 for the arch: the straight rod has no upright side."""
         return p[:, 0] > 0.0 if self._general is None else np.ones(len(p), bool)

@@ -135,7 +135,7 @@ class SpatialDescription(RodDescription[Build, SpatialModel]):
         quantity, units = self.quantity(raw), self.units
         label, scale = units.label(quantity), units.value(quantity)
         if raw in PLACES:
-            far = scale if self.profiles["axial"] is None else np.inf
+            far = self.farthest(raw)
             return Parameter(raw, label, scale, "fixed", float(self.places[raw]), -far, far)
         if raw.startswith("twist_"):
             near = np.nextafter(LARGEST_TWIST, np.inf)

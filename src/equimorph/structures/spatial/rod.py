@@ -233,6 +233,10 @@ class SpatialRod(DescribedInSpace):
             return pinned_natural_states(self.mechanics, self._raw, p, given)
         return natural_states(self._raw, given)
 
+    def in_reach(self, p: Parameters) -> Flags:
+        """Whether the ends are at most as far apart as the rod is long, or it stretches."""
+        return self.description.in_reach(self._raw.model, p)
+
     @check_arguments
     def planar_state(self, state: Any, **values: float) -> State:
         """State of a planar rod as a state of this one, in the plane z = 0.
