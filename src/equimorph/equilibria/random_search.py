@@ -35,6 +35,9 @@ ROUNDS = 8
 """Times that lines are laid through newly found equilibria, at most."""
 PUSHED = 120
 """Most states over a point that are pushed: with more, what they lead to takes most of the time."""
+PUSHES, OFTEN = 60, 20
+"""Pushes over a point, shared among its states, and most of one state. Of a rod in space one push
+in twenty leads to states that one random guess in thousands leads to, and lines do not."""
 CROWDED = 0.01
 """Length of a soft mode, in extents of the guesses, below which a state may have neighbours that
 random pushes step over."""
@@ -186,10 +189,12 @@ class Pools:
         """Push equilibria, those before `begin` left out, both ways by random forces through folds.
 
         The forces act on all unknowns, also where no load of the structure does; where they
-        vanish again there are equilibria. Left out over points with more than `PUSHED` states.
+        vanish again there are equilibria. Where few states are known each is pushed several times.
+        Left out over points with more than `PUSHED` states.
         """
-        few = np.bincount(self.group, minlength=1)[self.group] <= PUSHED
-        lanes = np.flatnonzero(few & (np.arange(len(self.z)) >= begin))
+        states = np.bincount(self.group, minlength=1)[self.group]
+        lanes = np.flatnonzero((states <= PUSHED) & (np.arange(len(self.z)) >= begin))
+        lanes = np.repeat(lanes, np.clip(PUSHES // states[lanes], 1, OFTEN))
         if len(lanes) == 0:
             return
         structure, z, group = self.ground.structure, self.z[lanes], self.group[lanes]

@@ -280,16 +280,11 @@ class GeneralMechanics(GeneralInertia):
 
     def sample(self, p: Parameters, generator: np.random.Generator) -> Lanes:
         """Random curvatures between the angles of ends, or of their springs at rest; forces."""
-        lanes, s = len(p), self.mesh.nodes
+        lanes, s, base = len(p), self.mesh.nodes, self.straight_angles(p)
         modes = np.arange(1, 9)
         amplitude = generator.normal(size=(lanes, len(modes))) * (3.0 / modes)
         amplitude *= generator.uniform(size=(lanes, 1))
-        y = np.concatenate([np.zeros((lanes, self.constraints)), p, np.ones((lanes, 1))], axis=1)
-        ends = np.einsum("kj,lj->lk", self.model.turned + self.model.rest, y)
         start, stop = self.model.held
-        known = np.array(self.model.held) | (self.model.springs > 0.0)
-        share = s if known.all() else np.full_like(s, float(known[1]))
-        base = ends[:, :1] * (1 - share) + ends[:, 1:] * share
         if start == stop:
             waves = np.sin(np.pi * np.outer(modes, s))
             base = base + (0.0 if start else generator.normal(size=(lanes, 1)))
@@ -298,6 +293,15 @@ class GeneralMechanics(GeneralInertia):
         theta = (base + amplitude @ waves)[:, self.unknown_nodes]
         forces = generator.normal(size=(lanes, self.constraints)) * FORCES
         return np.concatenate([theta, forces], axis=1)
+
+    def straight_angles(self, p: Parameters) -> Nodal:
+        """Angles linear in s between those of ends, or of their springs at rest."""
+        lanes, s = len(p), self.mesh.nodes
+        y = np.concatenate([np.zeros((lanes, self.constraints)), p, np.ones((lanes, 1))], axis=1)
+        ends = np.einsum("kj,lj->lk", self.model.turned + self.model.rest, y)
+        known = np.array(self.model.held) | (self.model.springs > 0.0)
+        share = s if known.all() else np.full_like(s, float(known[1]))
+        return np.asarray(ends[:, :1] * (1 - share) + ends[:, 1:] * share)
 
     def symmetries(self) -> tuple[Symmetry, ...]:
         """Mirror images and half turns that leave the Lagrangian as it is."""

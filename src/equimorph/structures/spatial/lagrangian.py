@@ -5,7 +5,7 @@ rotation of a node is q/|q|, so that z + dz is a state for every dz; the energy 
 keeps lengths at 1, and is zero at equilibria. See docs/decisions.md, "Rotations in space".
 """
 
-from functools import partial
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,7 @@ from equimorph.structures.equations import Direction
 from equimorph.structures.rod.mechanics import RodMechanics
 from equimorph.structures.rod.reflections import Reflection, find_symmetries
 from equimorph.structures.spatial.model import SpatialModel
+from equimorph.structures.spatial.planar import PlanarPart
 from equimorph.structures.spatial.quaternions import (
     FRAME,
     Jet,
@@ -41,13 +42,9 @@ WHOLE_TURNS = np.array([0.0, -1.0, 1.0, -2.0, 2.0])
 """Turns by 4π of guesses, which clamps do not see."""
 FORCES = 8.0
 """Spread of the support forces of random guesses."""
-
-IN_A_PLANE = [(0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, 1.0)]
-BENDINGS = np.array([*IN_A_PLANE, *3 * [(1.0, 1.0, 1.0)]])
-"""Axes t, n, b about which random guesses of some kinds turn: half of them bend in a plane, most of
-these in that of the drawing."""
-FORCES_OF_BENDINGS = np.where(BENDINGS.sum(axis=1, keepdims=True) > 1.0, 1.0, 1.0 - BENDINGS)
-"""Directions x, y, z of their support forces: all, or those in the plane."""
+PLANES = np.array([1, 2, 2, 0, 0, 0])
+"""Axes of the cross-section, n or b, about which random guesses of some kinds bend in a plane; 0:
+about all. Most of the first bend in that of the drawing."""
 
 Nodes = Float[np.ndarray, "lanes nodes 4"]
 
@@ -209,25 +206,32 @@ class SpatialLagrangian(RodMechanics):
     def sample(self, p: Parameters, generator: np.random.Generator) -> Lanes:
         """Rotations between those of the ends, turned by random waves, with random multipliers.
 
-        About all axes of the cross-sections, or in half of the guesses only about b or n, under
-        forces in the plane of bending: states that stay in a plane are common, and of the other
-        guesses one in thousands leads to some of them.
+        Half of them are those to which a rod leads that can only bend in a plane: states that stay
+        in one are common, and of the other guesses one in thousands leads to some of them.
         """
         lanes, s, modes = len(p), self.mesh.nodes, np.arange(1, 7)
         amplitude = generator.normal(size=(lanes, len(modes), 3)) * (3.0 / modes)[:, None]
         amplitude *= generator.uniform(size=(lanes, 1, 1))
-        kind = generator.integers(len(BENDINGS), size=lanes)
-        amplitude *= BENDINGS[kind][:, None]
         start, stop = self.model.held
         if start and stop:
             waves = np.sin(np.pi * np.outer(s, modes))
         else:
             waves = np.sin(np.pi * np.outer(s if start else 1.0 - s, modes - 0.5))
         turns = exponential(np.einsum("nm,lmk->lnk", waves, amplitude))
-        q = product(self.between(p), turns)[:, self.model.unknown_nodes]
+        between = self.between(p)
+        q = product(between, turns)
         forces = generator.normal(size=(lanes, self.constraints)) * FORCES
-        forces *= FORCES_OF_BENDINGS[kind] @ np.abs(self.model.reaction[:, : self.constraints])
+        axis = PLANES[generator.integers(len(PLANES), size=lanes)]
+        for part in self._planar_parts:
+            some = np.flatnonzero(axis == part.axis)
+            if len(some):
+                q[some], forces[some] = part.bend(between[some], p[some], generator)
+        q = q[:, self.model.unknown_nodes]
         return np.concatenate([q.reshape(lanes, self.unknowns), forces], axis=1)
+
+    @cached_property
+    def _planar_parts(self) -> tuple[PlanarPart, ...]:
+        return tuple(PlanarPart(self.model, axis) for axis in np.unique(PLANES[PLANES > 0]))
 
     def between(self, p: Parameters) -> Nodes:
         """Rotations with the angles of clamps, linear in s between two of them."""
