@@ -84,7 +84,7 @@ class CellIndex:
         return cls(lower, width, counts, starts, cells, maps, overhang)
 
     def near(self, points: Places) -> Hits:
-        """Cells that contain points or that these miss by at most their overhang."""
+        """Cells that contain points or that these miss by at most their overhang, in order."""
         bins = self.lower, self.width, self.counts, self.starts, self.cells
         points = np.ascontiguousarray(points, dtype=float)
         return Hits(*cells_near(points, bins, self.maps, self.overhang, NUDGE))

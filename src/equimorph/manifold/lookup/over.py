@@ -232,10 +232,10 @@ class Sheets:
         point, cell = self._rims.near(x)
         if len(point) == 0:
             return near
-        count, asked = len(self.cells), np.zeros(len(x), bool)
-        asked[point] = True
-        old = asked[near.point]
-        new = np.setdiff1d(point * count + cell, near.point[old] * count + near.cell[old])
+        count = len(self.cells)
+        new, old = np.unique(point * count + cell), near.point * count + near.cell  # both sorted
+        place = np.searchsorted(old, new)
+        new = new[np.append(old, -1)[place] != new]
         point, cell = np.divmod(new, count)
         more = Hits(point, cell, self.above.weights(x[point], cell), np.zeros(len(new), bool))
         return near.with_others(more)
