@@ -18,7 +18,7 @@ from equimorph.linalg.apart import firsts_apart
 from equimorph.model import Constraint, worst_relative_excess
 from equimorph.structures import Structure
 from equimorph.structures.contract import Symmetry
-from equimorph.structures.metric import metric_coordinates
+from equimorph.structures.metric import metric_coordinates, metric_length
 from equimorph.tolerances import SAME_STATE
 
 Groups = Numbers
@@ -38,6 +38,8 @@ PUSHED = 120
 PUSHES, OFTEN = 60, 20
 """Pushes over a point, shared among its states, and most of one state. Of a rod in space one push
 in twenty leads to states that one random guess in thousands leads to, and lines do not."""
+SYMMETRIC = 0.5
+"""Share of pushes that are as symmetric as the state that they push."""
 CROWDED = 0.01
 """Length of a soft mode, in extents of the guesses, below which a state may have neighbours that
 random pushes step over."""
@@ -258,11 +260,30 @@ class Pools:
     def _forces(self, pairs: Pairs) -> Lanes:
         """Random forces, as strong as pushes from states to guesses."""
         structure, n = self.ground.structure, self.ground.structure.unknowns
-        random = self.generator.normal(size=(len(pairs.p), n))
-        strength = strongest_pushes(structure, pairs) / np.linalg.norm(random, axis=1)
         force = np.zeros_like(pairs.start)
-        force[:, :n] = strength[:, None] * random * np.sqrt(structure.mass)
-        return force
+        random = self.generator.normal(size=(len(pairs.p), n))
+        force[:, :n] = random * np.sqrt(structure.mass)
+        self._make_symmetric(force, pairs)
+        strength = strongest_pushes(structure, pairs)
+        size = np.sqrt((force[:, :n] ** 2 / structure.mass).sum(axis=1))
+        return force * (strength / np.where(size > 0.0, size, 1.0))[:, None]
+
+    def _make_symmetric(self, force: Lanes, pairs: Pairs) -> None:
+        """Leave of half of the forces what the symmetries of the states that they push leave.
+
+        What is symmetric stays so, and meets few states: a plane frame in space those in its plane.
+        """
+        structure, n = self.ground.structure, self.ground.structure.unknowns
+        half = self.generator.uniform(size=len(force)) < SYMMETRIC
+        for each in structure.symmetries():
+            same = half & (each.image(pairs.p) == pairs.p).all(axis=1)
+            image = each.apply(pairs.start, pairs.p)[0]
+            same &= metric_length(structure, image - pairs.start) <= SAME_STATE
+            lanes = np.flatnonzero(same)
+            moved = pairs.start[lanes]
+            moved[:, :n] += force[lanes, :n] / structure.mass
+            turned = each.apply(moved, pairs.p[lanes])[0] - image[lanes]
+            force[lanes, :n] = 0.5 * (force[lanes, :n] + structure.mass * turned[:, :n])
 
     def _by_homotopy(self, guess: Lanes, group: Groups) -> Items:
         """Groups of the guesses that lead to a state."""

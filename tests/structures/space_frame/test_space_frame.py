@@ -215,3 +215,43 @@ def test_memory_of_a_grid_is_linear_in_its_members():
     (_, (few, less), (many, more)) = most
     assert (few, many) == (12, 97)
     assert np.log(more / less) / np.log(many / few) < 1.1
+
+
+TOGGLE = {"A": (0, 0), "B": (0.5, 0.2), "C": (1, 0)}
+
+
+@pytest.mark.parametrize(
+    ("places", "held", "force", "bound", "states"),
+    [
+        (TOGGLE, {"A": "fixed", "C": "pinned"}, (-3.04, -7.16), 8.94, 5),
+        (TOGGLE, {"A": "fixed", "C": "pinned"}, (-9.03, -2.31), 7.55, 3),
+        ({"A": (0, 0), "B": (0, 1), "C": (1, 1)}, {"A": "fixed"}, (-22.11, 7.0), 8.93, 2),
+    ],
+)
+@pytest.mark.parametrize("seed", [0, 1])
+def test_states_of_a_plane_frame_are_found_in_space(places, held, force, bound, states, seed):
+    """All of the planar frame's: guesses in all directions met one, "at most 1"."""
+    pairs, at = [("A", "B"), ("B", "C")], {"P": 1.0}
+    loads = {"P": {"B": force}}
+    planar = em.Frame(places, [em.Member(pair, 1.0) for pair in pairs], held, loads)
+    joints = {name: np.array([*place, 0.0]) for name, place in places.items()}
+    members = [
+        em.SpatialMember(
+            pair, EI=1.0, EI_out=4.5, GJ=1.7,
+            normal=tuple(np.cross([0, 0, 1], joints[pair[1]] - joints[pair[0]])),
+        ) for pair in pairs
+    ]  # fmt: skip
+    frame = em.SpatialFrame(
+        {name: tuple(place) for name, place in joints.items()},
+        members,
+        held,
+        {"P": {"B": (*force, 0)}},
+    )
+    energies = []
+    for each in (planar.resolving(bound), frame.resolving(bound)):
+        found = em.find_equilibria(each, at, within=[each.max_curvature <= bound], seed=seed)
+        across = np.abs(each.shape(found.z, found.p)[..., 2:])
+        inside = np.nanmax(across, axis=(1, 2), initial=0.0) < 1e-6
+        energies.append(np.sort([state.energy for state in found[inside]]))
+    assert len(energies[0]) == states
+    assert energies[1] == pytest.approx(energies[0], abs=1e-3)

@@ -15,6 +15,7 @@ from equimorph.structures.discrete import linearise
 from equimorph.structures.equations import AnyBorder, Direction, JointEquations, Shift, Solver
 from equimorph.structures.space_frame.derivative_kernels import equations_lanes
 from equimorph.structures.space_frame.energy_kernels import energies_lanes
+from equimorph.structures.space_frame.guesses import random_guesses
 from equimorph.structures.space_frame.kernels import linearise_lanes
 from equimorph.structures.space_frame.lagrangian import SpatialFrameLagrangian
 from equimorph.structures.space_frame.model import SpatialFrameModel
@@ -24,7 +25,6 @@ from equimorph.structures.spatial.mechanics import pairs_of
 from equimorph.structures.spatial.quaternions import (
     are_near,
     conjugate,
-    exponential,
     product,
     with_unit_rotations,
 )
@@ -253,8 +253,6 @@ class Tables:
 
 LARGEST_TAIL = 5e-4
 """Highest Legendre coefficients of w, half of radians, of an element that represents its part."""
-FORCES = 10.0
-"""Spread of the forces of random guesses, in units of bending stiffness over length squared."""
 
 
 class SpatialFrameMechanics(SpatialFrameLagrangian, JointEquations):
@@ -351,23 +349,9 @@ class SpatialFrameMechanics(SpatialFrameLagrangian, JointEquations):
     # --- guesses --------------------------------------------------------------------------------
 
     def sample(self, p: Parameters, generator: np.random.Generator) -> Lanes:
-        """Random turns of the bodies, waves along the members, angles of hinges, and forces."""
-        model, lanes = self.model, len(p)
-        size = generator.uniform(size=(lanes, 1))
-        vectors = np.zeros((lanes, len(model.turning), 3))
-        bodies = len(model.network.bodies)
-        vectors[:, :bodies] = 0.5 * generator.normal(size=(lanes, bodies, 3))
-        s, modes = model.mesh.nodes, np.arange(1, 4)
-        for row in model.piece_nodes:
-            ends = vectors[:, row[[0, -1]]]
-            amplitude = generator.normal(size=(lanes, 3, 3)) * (1.0 / modes)[:, None]
-            waves = np.einsum("nm,lmk->lnk", np.sin(np.pi * np.outer(s, modes)), amplitude)
-            base = ends[:, :1] * (1.0 - s)[:, None] + ends[:, 1:] * s[:, None]
-            vectors[:, row[1:-1]] = (base + waves)[:, 1:-1]
-        q = exponential(size[:, :, None] * vectors)[:, model.free].reshape(lanes, self._rows)
-        angles = size * generator.normal(size=(lanes, len(model.hinged)))
-        forces = FORCES * size * generator.normal(size=(lanes, self.constraints))
-        return np.concatenate([q, angles, forces], axis=1)
+        """Random turns and waves, in the plane of a plane frame, too, and forces."""
+        q, angles, forces = random_guesses(self.model, len(p), generator)
+        return np.concatenate([q.reshape(len(p), self._rows), angles, forces], axis=1)
 
     def as_guess(self, mean: Lanes) -> Lanes:
         """Means of states with rotations: quaternions of length 1."""
