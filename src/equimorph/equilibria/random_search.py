@@ -40,6 +40,8 @@ PUSHES, OFTEN = 60, 20
 in twenty leads to states that one random guess in thousands leads to, and lines do not."""
 SYMMETRIC = 0.5
 """Share of pushes that are as symmetric as the state that they push."""
+SHORT, STILL = 1e-4, 1e-2
+"""Length of steps in the directions of pushes, and how much of one must move something."""
 CROWDED = 0.01
 """Length of a soft mode, in extents of the guesses, below which a state may have neighbours that
 random pushes step over."""
@@ -206,6 +208,8 @@ class Pools:
         if len(apart) == 0:
             return
         force = self._forces(pairs.take(apart))
+        moving = force.any(axis=1)
+        apart, force = apart[moving], force[moving]
         both, ways = np.concatenate([force, -force]), pairs.take(np.tile(apart, 2))
         line = growing_force(structure, ways.p, both, ways.distance(structure))
         outcome = trace(line, ways.start, (), WIDE_STEPS)
@@ -258,32 +262,31 @@ class Pools:
         self._by_homotopy(guess[good], group[good])
 
     def _forces(self, pairs: Pairs) -> Lanes:
-        """Random forces, as strong as pushes from states to guesses."""
+        """Random forces, as strong as pushes from states to guesses; 0 where nothing can move."""
         structure, n = self.ground.structure, self.ground.structure.unknowns
-        force = np.zeros_like(pairs.start)
-        random = self.generator.normal(size=(len(pairs.p), n))
-        force[:, :n] = random * np.sqrt(structure.mass)
-        self._make_symmetric(force, pairs)
-        strength = strongest_pushes(structure, pairs)
-        size = np.sqrt((force[:, :n] ** 2 / structure.mass).sum(axis=1))
-        return force * (strength / np.where(size > 0.0, size, 1.0))[:, None]
+        step = np.zeros_like(pairs.start)
+        random = self.generator.normal(size=(len(step), n))
+        step[:, :n] = random / (np.sqrt(structure.mass) * np.linalg.norm(random, axis=1)[:, None])
+        self._make_symmetric(step, pairs)
+        size = np.maximum(metric_length(structure, step), STILL)
+        near = structure.as_guess(pairs.start + SHORT * step)  # rotations move, or are but scaled
+        moves = metric_length(structure, near - pairs.start) > STILL * SHORT
+        step[:, :n] *= structure.mass
+        return np.asarray(step * (moves * strongest_pushes(structure, pairs) / size)[:, None])
 
-    def _make_symmetric(self, force: Lanes, pairs: Pairs) -> None:
-        """Leave of half of the forces what the symmetries of the states that they push leave.
+    def _make_symmetric(self, step: Lanes, pairs: Pairs) -> None:
+        """Leave of half of the steps what the symmetries of the states where they begin leave.
 
         What is symmetric stays so, and meets few states: a plane frame in space those in its plane.
         """
-        structure, n = self.ground.structure, self.ground.structure.unknowns
-        half = self.generator.uniform(size=len(force)) < SYMMETRIC
+        structure = self.ground.structure
+        half = self.generator.uniform(size=len(step)) < SYMMETRIC
         for each in structure.symmetries():
             same = half & (each.image(pairs.p) == pairs.p).all(axis=1)
             image = each.apply(pairs.start, pairs.p)[0]
             same &= metric_length(structure, image - pairs.start) <= SAME_STATE
-            lanes = np.flatnonzero(same)
-            moved = pairs.start[lanes]
-            moved[:, :n] += force[lanes, :n] / structure.mass
-            turned = each.apply(moved, pairs.p[lanes])[0] - image[lanes]
-            force[lanes, :n] = 0.5 * (force[lanes, :n] + structure.mass * turned[:, :n])
+            moved = each.apply(pairs.start + step, pairs.p)[0]
+            step[same] = 0.5 * (step + moved - image)[same]
 
     def _by_homotopy(self, guess: Lanes, group: Groups) -> Items:
         """Groups of the guesses that lead to a state."""

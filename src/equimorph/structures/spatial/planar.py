@@ -17,6 +17,8 @@ from equimorph.structures.spatial.quaternions import product, turn_about
 Rotations = Float[np.ndarray, "lanes nodes 4"]
 BINORMAL = 2
 """Axis about which a rod bends in the plane of the drawing; the other one is 1."""
+STRAIGHT = 1e-6
+"""Largest angle of a rod that does not bend."""
 STEPS = Limits(iterations=40)
 """Of Newton's method in the plane, whose steps may be long: bending is quadratic in the angle."""
 
@@ -86,13 +88,14 @@ class PlanarPart:
         """Rotations and multipliers to which random planar guesses lead, or those of the guesses.
 
         `between`: rotations that the angles of the clamps, taken linearly between these, stand for.
-        They are turned by what the planar rod turns more.
+        They are turned by what the planar rod turns more. Where that is nothing guesses stay.
         """
         rod, unit = self.mechanics, np.eye(3)[self.axis]
-        guess = rod.sample(p, generator)
+        guess, straight = rod.sample(p, generator), rod.straight_angles(p)
         met = newton(rod, guess, p, STEPS)
-        z = np.where(met.found[:, None], met.z, guess)
-        more = rod.nodal_angles(z, p) - rod.straight_angles(p)
+        bent = np.abs(rod.nodal_angles(met.z, p) - straight).max(axis=1) > STRAIGHT
+        z = np.where((met.found & bent)[:, None], met.z, guess)
+        more = rod.nodal_angles(z, p) - straight
         forces = np.zeros((len(p), self.model.multipliers))
         forces[:, self.held] = z[:, rod.unknowns :]
         return product(turn_about(more[None], unit)[0], between), forces
