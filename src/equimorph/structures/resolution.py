@@ -10,7 +10,7 @@ from math import acos, ceil, prod
 from typing import Annotated, ClassVar, Self
 
 from scipy.optimize import brentq
-from scipy.special import j0
+from scipy.special import j0, jn_zeros
 
 from equimorph.argument_checks import check_arguments
 from equimorph.argument_vocabulary import POSITIVE
@@ -46,7 +46,7 @@ def _in_space(share: float) -> float:
     return UNEVEN * acos(share)
 
 
-FIRST_ZERO = 2.404825557695773
+FIRST_ZERO = float(jn_zeros(0, 1)[0])
 """Of J₀."""
 UNEVEN = 0.8
 """Smallest amplitude of waves along a rod, relative to that of even ones between the same ends:

@@ -8,13 +8,14 @@ from equimorph.manifold.lookup.exact_states import NEAREST, exact_states, neares
 from equimorph.manifold.lookup.over import Sheets
 from equimorph.structures import States
 from equimorph.structures.metric import metric_length
-from equimorph.tolerances import SAME_SOLUTION
+from equimorph.tolerances import SAME_SOLUTION, SAME_STATE, SAME_TO_ROUNDING
 
 
 def holding(sheets: Sheets, states: States) -> tuple[Flags, Numbers]:
     """Which states are among those over their own points; their cells, −1 if not known.
 
-    The cell whose guess is nearest to a state is tried first, then the next ones; only for what is
+    The cell whose guess is nearest to a state is tried first, then the next ones, and vertices: at
+    a cusp these have another index than states that are the same to round-off. Only for what is
     not found so all states over the point are asked for, once for all that lie over it.
     """
     z, p = states.z, states.p
@@ -23,6 +24,9 @@ def holding(sheets: Sheets, states: States) -> tuple[Flags, Numbers]:
         near = near.take(~known[near.point])
         good = near.take(_on_nearest(sheets, states, near, most))
         known[good.point], cell[good.point] = True, good.cell
+    near = near.take(~known[near.point])
+    good = near.take(_with_corners(sheets, states, near))
+    known[good.point], cell[good.point] = True, good.cell
     rest = np.flatnonzero(~known)
     if len(rest):
         places, place = np.unique(p[rest], axis=0, return_inverse=True)
@@ -48,6 +52,17 @@ def _on_nearest(sheets: Sheets, states: States, near: Hits, most: int) -> Some:
     good &= _are_same(sheets, z[own], found)
     some, own = some[good], own[good]
     return np.asarray(some[~_lie_beyond(sheets, states[own], near.cell[some])])
+
+
+def _with_corners(sheets: Sheets, states: States, near: Hits) -> Some:
+    """Those of the cells near states that have a state itself as a corner."""
+    corner, p = sheets.cells[near.cell], states.p[near.point]
+    there = (
+        np.abs(sheets.points.p[corner] - p[:, None]) <= SAME_TO_ROUNDING * sheets.structure.scales
+    )
+    hit, column = np.nonzero(there.all(axis=2))
+    gap = states.z[near.point[hit]] - sheets.points.z[corner[hit, column]]
+    return np.unique(hit[metric_length(sheets.structure, gap) <= SAME_STATE])
 
 
 def _lie_beyond(sheets: Sheets, states: States, cell: Numbers) -> Flags:
