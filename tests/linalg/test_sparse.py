@@ -71,6 +71,30 @@ def test_a_chain_is_eliminated_without_fill_in():
     assert len(SparseLayout(rows, columns, count).elimination.rows) == count - 1
 
 
+@pytest.mark.parametrize(
+    ("vanishing", "is_dense"), [((0,), False), ((11,), False), ((0, 11), True)]
+)
+def test_a_pivot_that_vanishes_is_avoided_in_another_order(vanishing, is_dense):
+    """A chain is taken from one end or the other; where both pivots vanish, it is solved dense.
+
+    The pivoted dense solver; 1e-12: a well-conditioned chain.
+    """
+    count = 12
+    chain = np.arange(count - 1)
+    rows = np.concatenate([np.arange(count), chain + 1])
+    layout = SparseLayout(rows, np.concatenate([np.arange(count), chain]), count)
+    values = np.ones((9, len(rows)))
+    values[:, :count] = 3.0
+    values[4, list(vanishing)] = 0.0
+    rhs = np.random.default_rng(0).normal(size=(9, 1, count))
+    found, full = layout.solve(values, None, rhs), layout.dense(values)
+    np.testing.assert_array_equal(np.flatnonzero(found.pivoted), [4] if is_dense else [])
+    expected = np.linalg.solve(full, rhs.transpose(0, 2, 1)).transpose(0, 2, 1)
+    np.testing.assert_allclose(found.x, expected, rtol=1e-12, atol=1e-12)
+    below = (np.linalg.eigvalsh(full) < 0.0).sum(axis=1)
+    np.testing.assert_array_equal(found.negative, below)
+
+
 def test_a_singular_matrix_within_a_regular_border_is_solved():
     """As at a fold: A = diag(1, 0) bordered by its null vector. 1e-15: a product of units."""
     layout = SparseLayout(np.array([0, 1, 1]), np.array([0, 0, 1]), 2)

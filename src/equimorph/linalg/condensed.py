@@ -170,20 +170,19 @@ class CondensedLayout:
         arrays = [np.ascontiguousarray(a) for a in given]
         x, negative, ratio, determinant = self._solve(*arrays)
         pivoted = np.zeros(lanes, bool)
+        found = BorderedSolution(x, negative, ratio, pivoted, determinant)
         if not ratio.min(initial=1.0) >= PIVOT_GUARD:
             doubtful = np.flatnonzero(~(ratio >= PIVOT_GUARD))
             refined = doubtful[ratio[doubtful] >= REFINABLE]
             x[refined], good = self._refine([a[refined] for a in arrays], x[refined])
             pivoted[doubtful] = True
             pivoted[refined[good]] = False
-        if pivoted.any():
-            full = [a[pivoted] for a in arrays]
+        if len(unsafe := np.flatnonzero(pivoted)):
+            full = [a[unsafe] for a in arrays]
             matrices = self.dense(full[0], full[1], full[6], (full[7], full[8]))
-            again = solve_bordered(matrices, *full[2:6])
-            x[pivoted], negative[pivoted] = again.x, again.negative
-            determinant[pivoted] = again.determinant
+            found.take_over(unsafe, solve_bordered(matrices, *full[2:6]))
         clear_overflows(determinant)
-        return BorderedSolution(x, negative, ratio, pivoted, determinant)
+        return found
 
     def near_null(
         self, diagonal: Float[np.ndarray, "lanes nodes"], border: Float[np.ndarray, "lanes m nodes"]

@@ -44,6 +44,11 @@ class BorderedSolution:
     pivoted: Flags
     determinant: Determinants
 
+    def take_over(self, lanes: Numbers, again: "BorderedSolution") -> None:
+        """Enter what some lanes were found to have when they were solved again."""
+        self.x[lanes], self.negative[lanes] = again.x, again.negative
+        self.determinant[lanes] = again.determinant
+
 
 def multiply(x: Lanes, matrix: Float[np.ndarray, "size ..."]) -> Float[np.ndarray, "lanes ..."]:
     """``x @ matrix`` for a matrix or vector, every lane the same bit for bit in any batch.

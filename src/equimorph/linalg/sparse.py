@@ -3,13 +3,14 @@
 See docs/decisions.md, "Sparse LDLᵀ without pivoting for trusses, frames and energies".
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from heapq import heappop, heappush
 
 import numpy as np
 
-from equimorph.arrays import Float, Int
+from equimorph.arrays import Float, Int, Values
 from equimorph.linalg.dense import Border, BorderedSolution, no_border, solve_bordered
 from equimorph.linalg.determinants import clear_overflows
 from equimorph.linalg.lanes import over_lanes
@@ -64,17 +65,26 @@ class SparseLayout:
     @cached_property
     def elimination(self) -> _Elimination:
         """Order and places of the elimination."""
-        ranks = self.ranks
+        return self._places(np.arange(self.size))
+
+    @cached_property
+    def second_elimination(self) -> _Elimination:
+        """Another order: of rows of the same degree the last ones go first."""
+        return self._places(np.arange(self.size)[::-1])
+
+    def _places(self, row: Int[np.ndarray, " size"]) -> _Elimination:
+        """Order and places of an elimination, where of rows of the same degree earlier ones go."""
+        ranks, turn = self.ranks, np.argsort(row)
         if ranks is None:
             ranks = (np.arange(self.size) >= self.size - self.multipliers).astype(int)
-        below = _elimination(self.rows, self.columns, ranks)
-        order = np.array([variable for variable, _ in below])
+        below = _elimination(turn[self.rows], turn[self.columns], ranks[row])
+        order = row[[variable for variable, _ in below]]
         place = np.empty(self.size, int)
         place[order] = np.arange(self.size)
         start = np.concatenate([[0], np.cumsum([len(others) for _, others in below])])
         rows = np.empty(start[-1], int)
         for k, (_, others) in enumerate(below):
-            rows[start[k] : start[k + 1]] = np.sort(place[others])
+            rows[start[k] : start[k + 1]] = np.sort(place[row[others]])
         low, high = np.sort(np.stack([place[self.rows], place[self.columns]]), axis=0)
         known = np.arange(self.size).repeat(np.diff(start)) * self.size + rows
         slot = self.size + np.searchsorted(known, low * self.size + high)
@@ -99,25 +109,23 @@ class SparseLayout:
 
         LDLᵀ without pivoting, but the last pivot, which shows a singular A at folds, is eliminated
         together with the border by Gauss with partial pivoting. Lanes whose entries grow by more
-        than `GROWTH` (or are no numbers) are solved again by the pivoted dense factorisation.
+        than `GROWTH` (or are no numbers) are solved again in another order, in which other parts
+        of A are regular; those that grow in both, by the pivoted dense factorisation.
         """
-        lanes = len(values)
-        around = no_border(lanes, self.size) if border is None else border
+        around = no_border(len(values), self.size) if border is None else border
         arrays = [np.ascontiguousarray(a) for a in (values, *around, rhs)]
-        x, growth, determinant = np.empty(rhs.shape), np.empty(lanes), np.empty((lanes, 2))
-        negative = np.empty(lanes, dtype=np.int64)
-        how = self.elimination
-        shared = (how.start, how.rows, how.alike, how.target, how.scatter, how.order)
-        if lanes:
-            over_lanes(solve_sparse, shared, arrays, [x, negative, growth, determinant])
-        pivoted = ~(growth <= GROWTH)
-        if pivoted.any():
-            again = solve_bordered(self.dense(values[pivoted]), *(a[pivoted] for a in arrays[1:]))
-            x[pivoted], negative[pivoted] = again.x, again.negative
-            determinant[pivoted] = again.determinant
-        clear_overflows(determinant)
-        ratio = 1.0 / np.maximum(growth, 1.0)
-        return BorderedSolution(x, negative, ratio, pivoted, determinant)
+        found, growth = _solve_in_order(self.elimination, arrays)
+        if len(unsafe := np.flatnonzero(~(growth <= GROWTH))):
+            some = [a[unsafe] for a in arrays]
+            again, growth[unsafe] = _solve_in_order(self.second_elimination, some)
+            found.take_over(unsafe, again)
+        if len(unsafe := np.flatnonzero(~(growth <= GROWTH))):
+            full = self.dense(arrays[0][unsafe])
+            found.take_over(unsafe, solve_bordered(full, *(a[unsafe] for a in arrays[1:])))
+            found.pivoted[unsafe] = True
+        clear_overflows(found.determinant)
+        np.divide(1.0, np.maximum(growth, 1.0), out=found.pivot_ratio)
+        return found
 
     def smallest_size(self, values: Float[np.ndarray, "1 entries"]) -> float:
         """Smallest absolute eigenvalue of a matrix, by inverse iteration; 0 if it is singular."""
@@ -130,6 +138,24 @@ class SparseLayout:
                 return 0.0
             smallest = 1.0 / length
         return smallest
+
+
+def _solve_in_order(
+    how: _Elimination, arrays: Sequence[np.ndarray]
+) -> tuple[BorderedSolution, Values]:
+    """Bordered solutions by one order of elimination, and the growth of the entries."""
+    lanes, rhs = len(arrays[0]), arrays[-1]
+    x, (growth, ratio), determinant = (
+        np.empty(rhs.shape),
+        np.empty((2, lanes)),
+        np.empty((lanes, 2)),
+    )
+    negative = np.empty(lanes, dtype=np.int64)
+    shared = (how.start, how.rows, how.alike, how.target, how.scatter, how.order)
+    if lanes:
+        over_lanes(solve_sparse, shared, arrays, [x, negative, growth, determinant])
+    found = BorderedSolution(x, negative, ratio, np.zeros(lanes, bool), determinant)
+    return found, growth
 
 
 def _updates(

@@ -28,9 +28,14 @@ class Curves:
         return self._columns[2, : self.count]
 
     @property
+    def amount(self) -> Items:
+        """How many points inside each curve has."""
+        return self._columns[3, : self.count]
+
+    @property
     def plain(self) -> ItemFlags:
         """Which curves have no inner points."""
-        return np.asarray(self._columns[3, : self.count] == 0)
+        return np.asarray(self.amount == 0)
 
     def add(self, edge: int, start: int, end: int, inner: list[int]) -> int:
         """Add a curve; return its number."""

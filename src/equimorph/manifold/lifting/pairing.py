@@ -25,6 +25,8 @@ from equimorph.tolerances import SAME_STATE
 
 NONE = -1
 """Index of points without tangents, which that of no state is."""
+TOGETHER = 4096
+"""Points whose slopes are computed together: their arrays stay in the processor's cache."""
 LAST = 1e-13, 1e-6
 """Largest entry of corrections that are taken: less is round-off, and with more it is no point."""
 
@@ -64,8 +66,11 @@ class Slopes:
         self._reserve(len(points.z))
         new = self.count + np.flatnonzero(points.vertex[self.count : points.count] >= 0)
         self.count = points.count
-        if len(new) == 0:
-            return
+        for at in range(0, len(new), TOGETHER):
+            self._compute(setting, points, new[at : at + TOGETHER])
+
+    def _compute(self, setting: Setting, points: Points, new: Items) -> None:
+        """Compute what some points have."""
         z, p = points.z.take(new, axis=0), points.p.take(new, axis=0)
         directions = np.zeros((len(new), len(setting.free), p.shape[1]))
         directions[:, np.arange(len(setting.free)), setting.free] = 1.0
@@ -221,6 +226,12 @@ class Pairing:
     def alive(self, curve: int) -> bool:
         """Whether a curve has not been taken back."""
         return self.ray(int(self.curves.start[curve]), int(self.curves.edge[curve])) == curve
+
+    def live_curves(self) -> Items:
+        """Curves that have not been taken back, in order."""
+        start, edge = self.curves.start, self.curves.edge
+        side = (self.mesh.edges[edge, 1] == self.points.vertex[start]).astype(int)
+        return np.flatnonzero(self.rays[start, self.slots[edge, side]] == np.arange(len(edge)))
 
     def rays_with(self, mark: RayMark) -> Rays:
         """Rays with a certain mark: each edge from one end, so that no curve is traced twice."""

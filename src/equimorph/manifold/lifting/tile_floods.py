@@ -60,19 +60,19 @@ def flood_tile(tile: Pairing) -> Flooded:
     """Flood a tile from all points that it is given."""
     known, given = tile.points.count, len(tile.curves.edge)
     flood(tile, Silent())
-    alive = np.array([tile.alive(curve) for curve in range(len(tile.curves.edge))], bool)
-    new = given + np.flatnonzero(alive[given:])
-    curves = np.array([tile.curves.edge, tile.curves.start, tile.curves.end], int).T[new]
-    inner = [tile.curves.inner.get(curve, []) for curve in new.tolist()]
+    live = tile.live_curves()
+    new = live[live >= given]
+    curves, inner = tile.curves, tile.curves.inner
+    filled = new[~curves.plain[new]].tolist()
     points, slots = np.nonzero(tile.rays[: tile.points.count] == RayMark.ABANDONED)
     edges = tile.incident[tile.points.vertex[points], slots]
     used = (tile.points.vertex[points] >= 0) & (edges >= 0)
     return Flooded(
         new_points(tile, known),
-        curves,
-        np.array([len(own) for own in inner], int),
-        np.array([point for own in inner for point in own], int),
-        np.flatnonzero(~alive[:given]),
+        np.stack([curves.edge, curves.start, curves.end], axis=1)[new],
+        curves.amount[new],
+        np.array([point for curve in filled for point in inner[curve]], int),
+        np.setdiff1d(np.arange(given), live),
         tile.effort,
         np.stack([points, edges], axis=1)[used],
         np.array([tile.conflicts]),

@@ -100,20 +100,13 @@ class Part:
 def parts_of(whole: Pairing, tiles: list[Tile]) -> list[Part]:
     """What is known of some tiles."""
     whole.fit()
-    live = _live(whole)
+    live = whole.live_curves()
     edge = whole.curves.edge[live]
     parts = []
     for tile in tiles:
         own = live[_flags(tile.edges, edge)]
         parts.append(Part(tile, _points_in(whole, tile), own))
     return parts
-
-
-def _live(whole: Pairing) -> Items:
-    """Curves that have not been taken back."""
-    start, edge = whole.curves.start, whole.curves.edge
-    side = (whole.mesh.edges[edge, 1] == whole.points.vertex[start]).astype(int)
-    return np.flatnonzero(whole.rays[start, whole.slots[edge, side]] == np.arange(len(edge)))
 
 
 def _points_in(whole: Pairing, tile: Tile) -> Items:

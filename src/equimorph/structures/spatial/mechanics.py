@@ -296,16 +296,14 @@ class SpatialMechanics(SpatialLagrangian, Equations):
         last: Lanes | None = None,
     ) -> BorderedSolution:
         """Solutions where those flagged come from the sparse solve, with a last row if given."""
-        unsafe = found.pivoted
-        if unsafe.any():
+        if len(unsafe := np.flatnonzero(found.pivoted)):
             entries = self.entries(z[unsafe], p[unsafe], None if shift is None else shift[unsafe])
             if last is not None:
                 own = self.layout.rows == self.size - 1
                 entries[:, own] = last[unsafe][:, self.layout.columns[own]]
             some = tuple(np.ascontiguousarray(each[unsafe]) for each in around)
             again = self.layout.solve(entries, (some[0], some[1], some[2]), rhs[unsafe])
-            found.x[unsafe], found.negative[unsafe] = again.x, again.negative
-            found.determinant[unsafe] = again.determinant
+            found.take_over(unsafe, again)
             found.pivot_ratio[unsafe] = again.pivot_ratio
         return found
 
