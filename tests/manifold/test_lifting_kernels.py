@@ -19,7 +19,14 @@ from equimorph.manifold.lifting.kernels import (
     square_gaps,
 )
 from equimorph.manifold.lifting.loops import find_loops
-from equimorph.manifold.lifting.pairing import Pairing, RayMark, Rays, start_pairing
+from equimorph.manifold.lifting.pairing import (
+    NONE,
+    Pairing,
+    RayMark,
+    Rays,
+    Slopes,
+    start_pairing,
+)
 from equimorph.manifold.lifting.patterns import Whole
 from equimorph.manifold.lifting.ray_kernels import enter_rays, rays_marked
 from equimorph.manifold.lifting.seeds import seeds
@@ -67,6 +74,25 @@ def test_points_are_polished_to_round_off(lifted):
     own = np.flatnonzero(lifted.points.vertex[: lifted.points.count] >= 0)
     residual = lifted.setting.structure.residual(lifted.points.z[own], lifted.points.p[own])
     assert np.abs(residual).max() < 1e-11
+
+
+def test_slopes_of_some_points_are_those_that_a_flood_has_found(lifted):
+    """Some points first, then all.
+
+    1e-8 of the size squared: a flood finds them one correction earlier, and where F_z is nearly
+    singular a tangent changes as its square.
+    """
+    points, known, again = lifted.points, lifted.slopes, Slopes.empty(lifted.setting)
+    own = np.flatnonzero(points.vertex[: points.count] >= 0)
+    again.fit(lifted.setting, points, own[::7])
+    assert (again.index[own[::7]] >= 0).all()
+    assert (np.delete(again.index[own], np.s_[::7]) == NONE).all()
+    again.fit(lifted.setting, points)
+    known.fit(lifted.setting, points)
+    np.testing.assert_array_equal(again.index[own], known.index[own])
+    size = np.abs(known.tangents[own]).max(axis=(1, 2))
+    error = np.abs(again.tangents[own] - known.tangents[own]).max(axis=(1, 2))
+    assert (error < 1e-8 * (1.0 + size) ** 2).all()
 
 
 def test_loops_equal_those_of_a_plain_walk(lifted):

@@ -177,7 +177,8 @@ class States(Tabular):
     @cached_property
     def residual(self) -> Values:
         """Largest absolute entry of F."""
-        return np.asarray(np.abs(self.structure.residual(self.z, self.p)).max(axis=1))
+        force = self.structure.residual(self.z, self.p)
+        return np.asarray(np.maximum(force.max(axis=1), -force.min(axis=1)))
 
     @cached_property
     def error_estimate(self) -> Values:

@@ -325,10 +325,10 @@ def account(pairing: Pairing, cells: Cells, frame: Frame, bisected: int) -> Equi
     number[used] = np.arange(len(used))
     store = pairing.points
     whole = Complex(
-        States(pairing.setting.structure, store.z[used].copy(), store.p[used].copy()),
-        store.kind[used].copy(),
-        store.index[used].copy(),
-        store.vertex[used].copy(),
+        States(pairing.setting.structure, store.z.take(used, axis=0), store.p.take(used, axis=0)),
+        store.kind[used],
+        store.index[used],
+        store.vertex[used],
         number[cells.corners],
         cells.index,
         _facets_in_use(number[cells.folds]),

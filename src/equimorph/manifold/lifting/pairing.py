@@ -57,15 +57,16 @@ class Slopes:
         excess = np.zeros((0, len(setting.constraints)))
         return cls(np.zeros(shape), np.zeros(0, int), np.zeros(0), excess)
 
-    def fit(self, setting: Setting, points: Points) -> None:
-        """Compute what is missing.
+    def fit(self, setting: Setting, points: Points, some: Items | None = None) -> None:
+        """Compute what is missing, of all points or of some.
 
         This corrects nothing by itself: points are exact, and the step that comes with their
         tangents takes off what round-off is left.
         """
         self._reserve(len(points.z))
-        new = self.count + np.flatnonzero(points.vertex[self.count : points.count] >= 0)
-        self.count = points.count
+        if some is None:
+            some, self.count = np.arange(self.count, points.count), points.count
+        new = some[(points.vertex[some] >= 0) & (self.index[some] == NONE)]
         for at in range(0, len(new), TOGETHER):
             self._compute(setting, points, new[at : at + TOGETHER])
 

@@ -269,7 +269,7 @@ def _models(pairing: Pairing, pairs: _Pairs, over: _Corners) -> tuple[Values, Sh
 def _slopes(pairing: Pairing, over: _Corners) -> Places:
     """Derivatives of the squared distances with respect to the free parameters."""
     setting, points, slopes = pairing.setting, pairing.points, pairing.slopes
-    slopes.fit(setting, points)
+    slopes.fit(setting, points, np.union1d(over.one, over.other))
     out = np.empty((len(over.one), len(setting.free)))
     over_lanes(
         slope_squares,
