@@ -56,6 +56,7 @@ from equimorph.structures.rod.mechanics import Bounds, PlanarMechanics
 from equimorph.structures.rod.planar_energy import PlanarEnergy
 from equimorph.structures.rod.profiles import LoadShape
 from equimorph.structures.rod.units import FOUR_PI_SQUARED
+from equimorph.structures.rod.waves import MODES, single_waves
 
 PARAMETERS = 4
 """Number of parameters: Θ, Δ, q, ν."""
@@ -294,16 +295,18 @@ class ClampedMechanics(PlanarMechanics):
     def sample(self, p: Parameters, generator: np.random.Generator) -> Lanes:
         """Linear angles plus random sine waves, with random support forces.
 
-        Eight waves and forces up to about 16 reach the compressed shapes with max |κ| near 20.
+        Eight waves and forces up to about 16 reach the compressed shapes with max |κ| near 20;
+        `single_waves` those that finer elements resolve.
         """
         lanes, s = len(p), self.mesh.nodes[1:-1]
-        modes = np.arange(1, 9)
-        waves = np.sin(np.pi * np.outer(modes, s))
-        amplitude = generator.normal(size=(lanes, len(modes))) * (3.0 / modes)
+        waves = np.sin(np.pi * np.outer(MODES, s))
+        amplitude = generator.normal(size=(lanes, len(MODES))) * (3.0 / MODES)
         amplitude *= generator.uniform(size=(lanes, 1))
         base = (p[:, 1] + p[:, 0])[:, None] * (1 - s) + (p[:, 1] - p[:, 0])[:, None] * s
-        forces = generator.normal(size=(lanes, 2)) * 8.0
-        return np.concatenate([base + amplitude @ waves, forces], axis=1)
+        theta, forces = base + amplitude @ waves, generator.normal(size=(lanes, 2)) * 8.0
+        some, wave, forces[some, 0] = single_waves(self.mesh, (True, True), lanes, generator)
+        theta[some], forces[some, 1] = base[some] + wave[:, 1:-1], 0.0
+        return np.concatenate([theta, forces], axis=1)
 
     def support_forces(self, z: Lanes, p: Parameters) -> Float[np.ndarray, "lanes 2"]:
         """λ and μ."""

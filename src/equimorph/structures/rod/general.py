@@ -34,6 +34,7 @@ from equimorph.structures.rod.model import RodModel, pack_tables
 from equimorph.structures.rod.planar_energy import PlanarEnergy
 from equimorph.structures.rod.pressure import EnclosedArea, coupling
 from equimorph.structures.rod.reflections import symmetries
+from equimorph.structures.rod.waves import MODES, single_waves
 from equimorph.structures.whole_turns import WholeTurns
 
 Points = Float[np.ndarray, "lanes points"]
@@ -44,6 +45,8 @@ LARGEST_GAP = 1e-4
 """Radians between θ as integrated and as solved for; errors of κ are about 100 times larger."""
 FORCES = 8.0
 """Standard deviation of random multipliers: the compressed shapes with max |κ| near 20."""
+PLACE = 2
+"""Multipliers of a rod whose ends are held in place: forces along x and y."""
 
 
 class GeneralMechanics(GeneralInertia):
@@ -279,20 +282,26 @@ class GeneralMechanics(GeneralInertia):
         return self.fused_advance(advance_lanes, shared, z, p, dp, row, corner, defect)
 
     def sample(self, p: Parameters, generator: np.random.Generator) -> Lanes:
-        """Random curvatures between the angles of ends, or of their springs at rest; forces."""
+        """Random curvatures between the angles of ends, or of their springs at rest; forces.
+
+        Where both places of the ends are held, some are `single_waves`.
+        """
         lanes, s, base = len(p), self.mesh.nodes, self.straight_angles(p)
-        modes = np.arange(1, 9)
-        amplitude = generator.normal(size=(lanes, len(modes))) * (3.0 / modes)
+        amplitude = generator.normal(size=(lanes, len(MODES))) * (3.0 / MODES)
         amplitude *= generator.uniform(size=(lanes, 1))
-        start, stop = self.model.held
+        turn: Nodal = np.zeros((lanes, 1))
+        start, stop = held = self.model.held
         if start == stop:
-            waves = np.sin(np.pi * np.outer(modes, s))
-            base = base + (0.0 if start else generator.normal(size=(lanes, 1)))
+            waves = np.sin(np.pi * np.outer(MODES, s))
+            turn = turn if start else generator.normal(size=(lanes, 1))
         else:
-            waves = np.sin(np.pi * np.outer(modes - 0.5, s if start else 1 - s))
-        theta = (base + amplitude @ waves)[:, self.unknown_nodes]
+            waves = np.sin(np.pi * np.outer(MODES - 0.5, s if start else 1 - s))
+        theta = base + turn + amplitude @ waves
         forces = generator.normal(size=(lanes, self.constraints)) * FORCES
-        return np.concatenate([theta, forces], axis=1)
+        if self.constraints == PLACE:
+            some, wave, forces[some, 0] = single_waves(self.mesh, held, lanes, generator)
+            theta[some], forces[some, 1] = base[some] + wave, 0.0
+        return np.concatenate([theta[:, self.unknown_nodes], forces], axis=1)
 
     def straight_angles(self, p: Parameters) -> Nodal:
         """Angles linear in s between those of ends, or of their springs at rest."""
