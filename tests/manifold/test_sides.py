@@ -311,8 +311,9 @@ def test_diagrams_begin_at_folds_and_crossings():
         assert (counts == sheets).all()
 
 
-@pytest.mark.parametrize("intervals", [(12, 12), (13, 17)])
-def test_the_spring_is_clean_from_no_load_on(intervals):
+@pytest.mark.parametrize("intervals", [(12, 12), (13, 17), (13, 7), (9, 21)])
+@pytest.mark.parametrize("seed", range(2))
+def test_the_spring_is_clean_from_no_load_on(intervals, seed):
     """Its pitchfork at x_l = 1 is a cusp over (x_l, F), in corners of boxes over F >= 0.
 
     Closed form: for F = 0 and x_l < 1 there are three states, one of which is flat; the fold at
@@ -320,8 +321,10 @@ def test_the_spring_is_clean_from_no_load_on(intervals):
     """
     spring = Spring()
     with unchecked():
-        eset = equilibrium_set(spring, Box(x_l=(0.5, 1), F=(0, 0.2)), intervals=intervals)
-        beside = equilibrium_set(spring, Box(x_l=(1, 1.5), F=(0, 0.2)), intervals=intervals)
+        eset, beside = (
+            equilibrium_set(spring, Box(x_l=each, F=(0, 0.2)), intervals=intervals, seed=seed)
+            for each in ((0.5, 1), (1, 1.5))
+        )
         x, F = np.random.default_rng(0).uniform((0.5, 0.0), (1.0, 0.2), (200, 2)).T
         counts = np.bincount(eset.over(x_l=x, F=F).point, minlength=200)
     assert eset.audit.clean

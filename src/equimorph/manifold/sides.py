@@ -161,9 +161,12 @@ class _Trim:
         for rows, at in ((plain, self._lifted(plain)), *self._on_curves(curved)):
             own = rows[at.found]
             z[own], p[own], found[own] = at.z[at.found], at.p[at.found], True
+        swallowed = self._swallowed(States(eset.structure, z, p), found)
+        # where both cannot become one vertex, both are at its place
+        z[swallowed[:, 0]], p[swallowed[:, 0]] = z[swallowed[:, 1]], p[swallowed[:, 1]]
         points = States(eset.structure, z, p)
         whole = replace(_whole(eset), points=points, fresh=None)
-        pairs = np.concatenate([self._coinciding(points), self._swallowed(points, found)])
+        pairs = np.concatenate([self._coinciding(points), swallowed])
         return describe_again(eset, self._joined(whole, pairs), eset.setting)
 
     def with_joined_neighbours(self) -> EquilibriumSet:

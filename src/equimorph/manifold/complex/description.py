@@ -6,7 +6,7 @@ from functools import partial
 
 import numpy as np
 
-from equimorph.arrays import Bool, CellFlags, CellNumbers, Cells, Float, Int, VertexNumbers
+from equimorph.arrays import Bool, CellFlags, CellNumbers, Cells, Float, Int, Items, VertexNumbers
 from equimorph.linalg.lanes import start
 from equimorph.manifold.complex.audit import Audit
 from equimorph.manifold.complex.base_mesh import BaseMesh
@@ -324,6 +324,8 @@ BEYOND = 1e-5
 """Excess of a vertex over a bound, relative to that, which is not that of its location."""
 VANISHING = 1e-4
 """Size of the eigenvalues that may count either way at folds and where sheets cross."""
+ROUND_OFF = 1e-9
+"""Size of those that may count either way anywhere: vertices may lie on cusps in corners."""
 
 
 def contradictions(
@@ -333,13 +335,18 @@ def contradictions(
 
     At folds, and where sheets cross, the eigenvalues that vanish may count or not.
     """
-    structure, singular = points.structure, are_singular(kinds)
     low, high = points.inertia[0].copy(), points.inertia[0].copy()
-    z, p = points.z[singular], points.p[singular]
-    for bound, shift in ((low, -VANISHING), (high, VANISHING)):
-        bound[singular] = count_below(structure, z, p, shift)
-    index = cell_index[:, None]
-    return np.asarray(((index < low[cells]) | (index > high[cells])).any(axis=1))
+
+    def widen(some: Items, vanishing: float) -> CellFlags:
+        z, p = points.z[some], points.p[some]
+        for bound, shift in ((low, -vanishing), (high, vanishing)):
+            bound[some] = count_below(points.structure, z, p, shift)
+        index = cell_index[:, None]
+        return np.asarray(((index < low[cells]) | (index > high[cells])).any(axis=1))
+
+    singular = np.flatnonzero(are_singular(kinds))
+    off = widen(singular, VANISHING)
+    return widen(np.setdiff1d(cells[off], singular), ROUND_OFF) if off.any() else off
 
 
 def beyond_bounds(points: States, cells: Cells, constraints: tuple[Constraint, ...]) -> CellFlags:
