@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, strategies as st
 
 from draws import few
-from equimorph.manifold import build, equilibrium_set
-from equimorph.manifold.lifting import completeness
+from equimorph.manifold import equilibrium_set
+from equimorph.manifold.lifting import completeness, spread
 from equimorph.manifold.lifting.seeds import seeds
 from equimorph.model import Box, Descriptor
 from oracles.complexes import assert_faithful, assert_folds_are_singular
@@ -107,7 +107,7 @@ def test_sheets_that_the_seeds_lack_are_found_by_the_checks(monkeypatch):
     def first(*given):
         return tuple(column[:1] for column in seeds(*given))
 
-    monkeypatch.setattr(build, "seeds", first)
+    monkeypatch.setattr(spread, "seeds", first)
     eset = lifted(three_sheets(), Box(a=(-2, 1), b=(-1.5, 1.5)), intervals=(4, 5), checks=2)
     assert topology(eset) == (3, 3, 3)
     assert eset.audit.recovered >= 2
@@ -125,7 +125,7 @@ def test_all_points_are_searched_once_nothing_is_missing(monkeypatch):
 
     search = completeness._searched
     monkeypatch.setattr(completeness, "_searched", counted)
-    monkeypatch.setattr(build, "seeds", lambda *given: tuple(each[:1] for each in seeds(*given)))
+    monkeypatch.setattr(spread, "seeds", lambda *given: tuple(each[:1] for each in seeds(*given)))
     eset = lifted(three_sheets(), Box(a=(-2, 1), b=(-1.5, 1.5)), intervals=(4, 5), checks=8)
     assert eset.audit.clean
     *before, first, last = searched

@@ -19,6 +19,7 @@ from equimorph import (
 )
 from equimorph.structures import from_identity
 from oracles import spatial_frames
+from oracles.specimens import portal
 
 
 def strut() -> Frame:
@@ -174,3 +175,21 @@ def test_a_set_of_a_frame_with_a_hinge_is_no_lattice_of_copies():
     )
     assert eset.audit.clean
     assert len(eset.points) == 27
+
+
+def test_a_set_has_no_piece_twice_where_a_loose_member_turns_past_half_a_turn():
+    """Two copies met over no vertex of the coarse grid; three seeds of six had both."""
+    frame = portal(50.0, elements=2, degree=8)
+    eset = equilibrium_set(
+        frame,
+        Box(k=(-0.9908, 0.7716), P=(-4.1388, 4.9227)),
+        fixed={"d": 0.0594, "q": -1.4731},
+        within=[frame.max_curvature <= 2.15],
+        intervals=(10, 14),
+        seed=3,
+    )
+    for k, P in ((-0.9, -3.7), (-0.5, -1.5), (-0.198, -0.061)):
+        energy = np.sort(eset.at(k=k, P=P).energy)
+        assert np.diff(energy).min(initial=np.inf) > 1e-6
+    assert eset.audit.clean
+    assert len(eset.at(k=-0.198, P=-0.061)) == 2

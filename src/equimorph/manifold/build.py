@@ -14,14 +14,12 @@ from equimorph.manifold.complex.kept_sets import Effort, question_of_set, recall
 from equimorph.manifold.geometry.setting import Setting
 from equimorph.manifold.lifting.cells import CellFinder, Cells, Outlook, account
 from equimorph.manifold.lifting.completeness import Check, check, recover
-from equimorph.manifold.lifting.copies import without_copies
 from equimorph.manifold.lifting.crossing_branches import flood_crossings, ring_middles
 from equimorph.manifold.lifting.endless import refuse_copies
 from equimorph.manifold.lifting.flood import flood
 from equimorph.manifold.lifting.grid import (
     Lines,
     bisect,
-    coarse_grid,
     grid_lines,
     grid_mesh,
     longest_edges,
@@ -29,7 +27,8 @@ from equimorph.manifold.lifting.grid import (
 from equimorph.manifold.lifting.hidden_islands import IslandFinder
 from equimorph.manifold.lifting.layers import find_through_layers
 from equimorph.manifold.lifting.pairing import Pairing, start_pairing
-from equimorph.manifold.lifting.seeds import Seeds, is_symmetric, seeds
+from equimorph.manifold.lifting.seeds import is_symmetric
+from equimorph.manifold.lifting.spread import begun_without_copies, spread_seeds
 from equimorph.manifold.lifting.strips import strips_astray
 from equimorph.manifold.lifting.tile_rounds import TileRounds
 from equimorph.manifold.lifting.tiles import cuts_between
@@ -41,8 +40,6 @@ from equimorph.manifold.sides import box_of, is_stuck_at_sides, trimmed, widened
 from equimorph.model import Box, Constraint, Journal, Progress, Silent, Workers
 from equimorph.structures import Structure
 
-COARSE = {1: 12, 2: 12, 3: 7}
-"""Most intervals along each parameter of the coarse grid over which seeds are spread."""
 BISECTIONS = {1: 12, 2: 24, 3: 60}
 """Rounds by the number of free parameters: each cuts the longest edges of doubtful cells. Of 218
 sets 189 needed none, and the others 9 at most."""
@@ -217,7 +214,7 @@ def _start_lifting(order: _Order, lines: Lines) -> "_Lifting":
     """Points over the vertices of a grid from which it can be lifted."""
     order.progress.report("seeds", 0, 1)
     pairing = start_pairing(order.setting, grid_mesh(lines), order.effort.limit)
-    pairing.points.over_vertices(*_spread(pairing, lines, order.effort.seed, order.progress))
+    pairing.points.over_vertices(*spread_seeds(pairing, lines, order.effort.seed, order.progress))
     return _Lifting(pairing, order, tuple(len(line) - 1 for line in lines), order.rounds(lines))
 
 
@@ -225,12 +222,12 @@ def _complete(
     lifting: "_Lifting", cells: Cells, eset: EquilibriumSet
 ) -> tuple[Cells, EquilibriumSet]:
     """Cells and set, with what the completeness checks find that it lacks."""
-    pairing, order, effort = lifting.pairing, lifting.order, lifting.order.effort
+    order, effort = lifting.order, lifting.order.effort
     generator = np.random.default_rng([effort.seed, 1])
     recovered, islands = 0, IslandFinder()
     for number in range(SEARCHES):
         # what stays undecided in spite of bisection is not mended by more equilibria
-        if pairing.is_full or lifting.given_up:
+        if lifting.pairing.is_full or lifting.given_up:
             found = Check(0, eset.points[:0])
             break
         points = _checks(effort.checks, order.setting)
@@ -241,7 +238,7 @@ def _complete(
             break
         recovered += lacking
         some = np.unique(np.linspace(0, lacking - 1, RECOVERED).astype(int))
-        recover(pairing, found.missing[some])
+        recover(lifting.pairing, found.missing[some])
         cells, eset = lifting.upright()
     return cells, lifting.with_checks(cells, eset, found, recovered)
 
@@ -262,6 +259,7 @@ class _Lifting:
 
     def upright(self) -> tuple[Cells, EquilibriumSet]:
         """Cells and set; grid cells below those of a wrong sense are bisected and lifted again."""
+        self._drop_copies()
         self.pairing.fit()
         cells, eset = self._lift()
         for _ in range(MENDED):
@@ -269,6 +267,12 @@ class _Lifting:
                 break
             cells, eset = self._lift()
         return cells, eset
+
+    def _drop_copies(self) -> None:
+        """Begin again without pieces that are copies of others, if there are such."""
+        pairing = begun_without_copies(self.pairing, self.order.progress)
+        if pairing is not self.pairing:
+            self.pairing, self.finder, self.unseen = pairing, CellFinder(), UnseenFinder()
 
     def _lift(self) -> tuple[Cells, EquilibriumSet]:
         cells, bisected = self._lift_grid()
@@ -381,20 +385,3 @@ def _look(pairing: Pairing, cells: Cells, finder: CellFinder, unseen: UnseenFind
     again = finder.find(pairing)
     doubtful = np.union1d(cells.doubtful_triangles, again.doubtful_triangles)
     return replace(again, doubtful_triangles=doubtful, touching=cells.touching)
-
-
-def _spread(pairing: Pairing, lines: Lines, seed: int, progress: Progress) -> Seeds:
-    """Seeds, spread over a coarse grid in a box somewhat larger than that of the fine grid.
-
-    So the flood of the fine grid starts everywhere at once, with many edges at a time, and on
-    pieces, too, that hang together only beyond the box.
-    """
-    setting = pairing.setting
-    mesh, number = coarse_grid(lines, COARSE[len(lines)], setting.limits)
-    coarse = start_pairing(setting, mesh, pairing.limit)
-    coarse.points.over_vertices(*seeds(setting, mesh, np.flatnonzero(number >= 0), seed))
-    flood(coarse, progress)
-    store, found = coarse.points, without_copies(coarse)
-    fine = number[store.vertex[found]]
-    found, fine = found[fine >= 0], fine[fine >= 0]
-    return fine, store.z[found], store.p[found], store.index[found]

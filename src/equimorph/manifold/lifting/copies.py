@@ -22,12 +22,14 @@ def without_copies(pairing: Pairing) -> Items:
     over = np.flatnonzero(vertex >= 0)
     if len(structure.whole_turns.free) == 0:
         return over
+    least = structure.whole_turns.taken_back(store.z[: store.count])
+    turned = metric_length(structure, store.z[over] - least[over]) > SAME_STATE
+    crowded = np.unique(vertex[over[turned]])  # of two copies one at least has turned
     lifted = pairing.curves.end >= 0
     ends = np.stack([pairing.curves.start, pairing.curves.end], axis=1)[lifted]
     piece = components(store.count, ends)
-    least = structure.whole_turns.taken_back(store.z[: store.count])
     pairs = np.array(
-        [pair for each in np.unique(vertex[over]) for pair in combinations(store.over(each), 2)],
+        [pair for each in crowded for pair in combinations(store.over(each), 2)],
         dtype=int,
     ).reshape(-1, 2)
     alike = metric_length(structure, least[pairs[:, 0]] - least[pairs[:, 1]]) < SAME_STATE
