@@ -133,7 +133,7 @@ def test_all_points_are_searched_once_nothing_is_missing(monkeypatch):
     assert all(points == 2 for points, _ in before)
     assert before[0][1] > 0
     assert (first, last) == ((2, 0), (6, 0))
-    assert eset.audit.starts == 8 * 200
+    assert eset.audit.starts == 8 * 200 * three_sheets().guesses_per_start
 
 
 def island(radius: float, places: tuple[float, ...]) -> Polynomial:

@@ -47,8 +47,9 @@ CROWDED = 0.01
 random pushes step over."""
 FIRM = 100.0
 """Force of a push along a soft mode, over stiffness times length of the mode."""
-HOMOTOPIES = 0.05
-"""Share of the guesses from which Newton homotopy starts (where Newton found nothing)."""
+HOMOTOPIES = 0.25
+"""Share of the guesses from which Newton homotopy starts as well: it leads to other states, where
+Newton's method leaves what guesses are near."""
 MEANS = 3
 """Known states of which guesses between them are means."""
 ITERATIONS, WAY = 30, 7.0
@@ -141,9 +142,10 @@ class Pools:
         return np.asarray(self.z[np.setdiff1d(own, known[apart])])
 
     def start(self, guesses: int) -> None:
-        """Newton from random guesses, homotopy where it fails, deflation next to what was found."""
+        """Newton from random guesses, homotopy from some, deflation next to what was found."""
         structure = self.ground.structure
         groups = np.flatnonzero(structure.in_reach(self.ground.p))
+        guesses = round(structure.guesses_per_start * guesses)
         group = np.repeat(groups, guesses)
         p = self.ground.p[group]
         guess = structure.sample(p, self.generator)
@@ -155,8 +157,10 @@ class Pools:
         found = near.found
         self.failures.append(("Newton did not converge", group[~found]))
         led = self._take(near.z[found], group[found])
-        again = ~found & (number < np.ceil(HOMOTOPIES * guesses))
-        followed = self._by_homotopy(guess[again], group[again])
+        some = np.ceil(HOMOTOPIES * guesses)
+        again = (number >= guesses - some) | (~found & (number < some))  # the first are special
+        self._by_homotopy(guess[again & found], group[again & found])
+        followed = self._by_homotopy(guess[again & ~found], group[again & ~found])
         self.starts, self.arrived = group, np.concatenate([led, followed])
         self._by_deflation(np.arange(len(self.z)), NUDGE)
 

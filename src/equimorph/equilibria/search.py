@@ -112,7 +112,7 @@ def find_equilibria(
     within
         Constraints that states must obey, like ``[arch.max_curvature <= 20]``.
     starts
-        Number of random guesses of the first runs together.
+        Number of random guesses of the first runs together; `Structure.guesses_per_start` for each.
     runs
         Number of independent runs; at most three times as many are made.
     seed

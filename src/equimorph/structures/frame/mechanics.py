@@ -175,6 +175,8 @@ class Tables:
 
 Points = Float[np.ndarray, "lanes points"]
 
+GUESSES = 3.0
+"""Random guesses for each start of a search."""
 RESOLVED = 1e-3
 """Largest of the two highest Legendre coefficients of a turn in a resolved element."""
 
@@ -346,6 +348,11 @@ class FrameMechanics(DiscreteStructure):
 
     # --- guesses --------------------------------------------------------------------------------
 
+    @property
+    def guesses_per_start(self) -> float:
+        """Three at least: one in a hundred leads to states whose joints turn far."""
+        return max(super().guesses_per_start, GUESSES)
+
     def sample(self, p: Parameters, generator: np.random.Generator) -> Lanes:
         """Random turns of the joints around those of supports, waves along the members, and forces.
 
@@ -362,9 +369,7 @@ class FrameMechanics(DiscreteStructure):
                 each[:, ends[:1]] * (1.0 - s) + each[:, ends[1:]] * s for each in (turn, around)
             )
             waves = generator.normal(size=(lanes, len(modes))) * (1.5 / modes)
-            nodes[:, row] = middle + size * (
-                0.5 * base + waves @ np.sin(np.pi * np.outer(modes, s))
-            )
+            nodes[:, row] = middle + size * (base + waves @ np.sin(np.pi * np.outer(modes, s)))
         forces = 10.0 * size * generator.normal(size=(lanes, self.constraints))
         return np.concatenate([nodes[:, model.place >= 0], forces], axis=1)
 

@@ -25,6 +25,7 @@ from equimorph.structures.space_frame.member import SpatialMemberSpec, SpatialSu
 from equimorph.structures.space_frame.model import SpatialFrameModel
 from equimorph.structures.space_frame.network import spatial_network
 from equimorph.structures.spatial.quaternions import LONGEST_STEP
+from equimorph.structures.spatial.windings import GUESSES
 from equimorph.structures.unit_system import Units, unit_system
 
 
@@ -311,6 +312,11 @@ class SpatialFrame(DescribedSpatialFrame):
         effects = self._actuators, self._loads
         super().__init__(SpatialFrameModel.of(made, effects, (elements, degree), system))
         self._describe()
+
+    @property
+    def guesses_per_start(self) -> float:
+        """More where some wind."""
+        return GUESSES if self.model.most_half_windings else 1.0
 
     @property
     def unstressed(self) -> SpatialFrameMechanics:

@@ -14,6 +14,7 @@ from equimorph.structures.frame.any_model import AnyFrameModel
 from equimorph.structures.frame.statics import NOTHING, Pivots, SpaceFlows, SpaceStatics
 from equimorph.structures.space_frame.network import SpatialNetwork, Turning
 from equimorph.structures.spatial.quaternions import exponential, matrices
+from equimorph.structures.spatial.windings import WINDING, most_windings
 
 LENGTH_STIFFNESS = 4000.0
 """Stiffness of the lengths of quaternions in the metric, in units of bending: margins are known
@@ -63,6 +64,19 @@ class SpatialFrameModel(AnyFrameModel):
         line = line / np.linalg.norm(line)
         across = away - (away @ line)[:, None] * line
         return line if np.abs(across).max() <= ON_LINE * np.abs(away).max() else None
+
+    @cached_property
+    def normals(self) -> Float[np.ndarray, "planes 3"]:
+        """Normals of planes in which all joints lie: none, one, or two of those around a line."""
+        away = self.network.places - self.network.places[0]
+        # three more rows: as many axes, however few joints
+        _, sizes, axes = np.linalg.svd(np.append(away, np.zeros((3, 3)), 0), full_matrices=False)
+        return np.asarray(axes[sizes <= ON_LINE * sizes[0]])
+
+    @cached_property
+    def most_half_windings(self) -> int:
+        """Turns by 2π along each piece of a member that states may have."""
+        return most_windings(self.mesh.elements, self.mesh.degree, 0.5 * WINDING)
 
     # --- numbering ------------------------------------------------------------------------------
 

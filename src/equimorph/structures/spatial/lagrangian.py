@@ -31,6 +31,14 @@ from equimorph.structures.spatial.quaternions import (
     normalise,
     product,
     strains,
+    turn_about,
+)
+from equimorph.structures.spatial.windings import (
+    FLATTER,
+    WINDING,
+    most_windings,
+    random_axes,
+    random_windings,
 )
 
 LENGTH_STIFFNESS = 100.0
@@ -207,7 +215,8 @@ class SpatialLagrangian(RodMechanics):
         """Rotations between those of the ends, turned by random waves, with random multipliers.
 
         Half of them are those to which a rod leads that can only bend in a plane: states that stay
-        in one are common, and of the other guesses one in thousands leads to some of them.
+        in one are common, and of the other guesses one in thousands leads to some of them. Between
+        two clamps some wind about an axis.
         """
         lanes, s, modes = len(p), self.mesh.nodes, np.arange(1, 7)
         amplitude = generator.normal(size=(lanes, len(modes), 3)) * (3.0 / modes)[:, None]
@@ -217,21 +226,39 @@ class SpatialLagrangian(RodMechanics):
             waves = np.sin(np.pi * np.outer(s, modes))
         else:
             waves = np.sin(np.pi * np.outer(s if start else 1.0 - s, modes - 0.5))
+        forces = generator.normal(size=(lanes, self.constraints)) * FORCES
+        axis = PLANES[generator.integers(len(PLANES), size=lanes)]
+        windings = random_windings(self.most_windings, axis > 0, generator)
+        amplitude[windings != 0] *= FLATTER
         turns = exponential(np.einsum("nm,lmk->lnk", waves, amplitude))
         between = self.between(p)
         q = product(between, turns)
-        forces = generator.normal(size=(lanes, self.constraints)) * FORCES
-        axis = PLANES[generator.integers(len(PLANES), size=lanes)]
+        wound = np.flatnonzero((axis == 0) & (windings != 0))
+        if len(wound):
+            along = WINDING * np.outer(windings[wound], s)
+            around = turn_about(along[None], random_axes(len(wound), generator)[:, None])[0]
+            q[wound] = product(product(between[wound], around), turns[wound])
         for part in self._planar_parts:
-            some = np.flatnonzero(axis == part.axis)
+            some = np.flatnonzero((axis == part.axis) & (windings == part.windings))
             if len(some):
                 q[some], forces[some] = part.bend(between[some], p[some], generator)
         q = q[:, self.model.unknown_nodes]
         return np.concatenate([q.reshape(lanes, self.unknowns), forces], axis=1)
 
     @cached_property
+    def most_windings(self) -> int:
+        """Windings of guesses; nothing keeps those of a rod with one clamp."""
+        mesh = self.mesh
+        return most_windings(mesh.elements, mesh.degree) if all(self.model.held) else 0
+
+    @cached_property
     def _planar_parts(self) -> tuple[PlanarPart, ...]:
-        return tuple(PlanarPart(self.model, axis) for axis in np.unique(PLANES[PLANES > 0]))
+        most = self.most_windings
+        return tuple(
+            PlanarPart(self.model, axis, windings)
+            for axis in np.unique(PLANES[PLANES > 0])
+            for windings in range(-most, most + 1)
+        )
 
     def between(self, p: Parameters) -> Nodes:
         """Rotations with the angles of clamps, linear in s between two of them."""

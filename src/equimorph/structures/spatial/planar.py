@@ -13,6 +13,7 @@ from equimorph.structures.rod.general import GeneralMechanics
 from equimorph.structures.rod.model import Densities, RodModel
 from equimorph.structures.spatial.model import SpatialModel
 from equimorph.structures.spatial.quaternions import product, turn_about
+from equimorph.structures.spatial.windings import WINDING
 
 Rotations = Float[np.ndarray, "lanes nodes 4"]
 BINORMAL = 2
@@ -29,9 +30,10 @@ class PlanarPart:
     Twist and bending out of the plane, loads across it and angles of clamps out of it are left out.
     """
 
-    def __init__(self, model: SpatialModel, axis: int) -> None:
-        """Bend about the axis of the cross-sections with this number, 1 or 2."""
-        self.model, self.axis = model, axis
+    def __init__(self, model: SpatialModel, axis: int, windings: int = 0) -> None:
+        """Bend about the axis of the cross-sections with this number, 1 or 2, and wind."""
+        self.model, self.axis, self.windings = model, axis, windings
+        self.turn = WINDING * windings
         self.across, self.sign = 3 - axis, 1.0 if axis == BINORMAL else -1.0
         count = model.multipliers
         plane = np.abs(model.reaction[[0, self.across], :count]).sum(axis=0) > 0.0
@@ -56,6 +58,8 @@ class PlanarPart:
             along, across, bending, tension, torsion, rigidity, model.softness[..., 0]
         )
         none = np.zeros((2, len(kept)))
+        turned = model.turned[:, BINORMAL - axis][:, kept]
+        turned[1, -1] += self.turn
         rows = np.array([[0], [self.across]]), kept
         return GeneralMechanics(
             RodModel(
@@ -74,7 +78,7 @@ class PlanarPart:
                 fine=fields,
                 slope=slope,
                 element_slope=element_slope,
-                turned=model.turned[:, BINORMAL - axis][:, kept],
+                turned=turned,
                 springs=np.zeros(2),
                 rest=none,
                 pressure=none[0],
@@ -95,7 +99,7 @@ class PlanarPart:
         met = newton(rod, guess, p, STEPS)
         bent = np.abs(rod.nodal_angles(met.z, p) - straight).max(axis=1) > STRAIGHT
         z = np.where((met.found & bent)[:, None], met.z, guess)
-        more = rod.nodal_angles(z, p) - straight
+        more = rod.nodal_angles(z, p) - straight + self.turn * self.model.mesh.nodes
         forces = np.zeros((len(p), self.model.multipliers))
         forces[:, self.held] = z[:, rod.unknowns :]
         return product(turn_about(more[None], unit)[0], between), forces

@@ -33,6 +33,7 @@ from equimorph.structures.spatial.natural import (
 from equimorph.structures.spatial.orbits import OrbitMechanics
 from equimorph.structures.spatial.phase import PinnedMechanics
 from equimorph.structures.spatial.quaternions import LONGEST_STEP, with_unit_rotations
+from equimorph.structures.spatial.windings import GUESSES
 from equimorph.structures.states import State
 from equimorph.structures.unit_system import Quantity, Units
 
@@ -218,6 +219,11 @@ class SpatialRod(DescribedInSpace):
     def identity(self) -> dict[str, Any]:
         """Kind, resolution, and everything that differs from the default."""
         return self._complete_identity(self.description.data(), self.resolution)
+
+    @property
+    def guesses_per_start(self) -> float:
+        """More where some wind."""
+        return GUESSES if self.mechanics.most_windings else 1.0
 
     # --- natural states -------------------------------------------------------------------------
 

@@ -1,0 +1,49 @@
+"""Guesses of rods in space between clamps that turn over and over along their length.
+
+A turn by 4π along a rod leaves both clamps as they are, and can be undone by bending alone: states
+with such turns belong to the same structure. See docs/decisions.md, "Guesses wind".
+"""
+
+import numpy as np
+
+from equimorph.arrays import Flags, Float, Numbers
+from equimorph.structures.resolution import IN_SPACE, turn_of_element
+
+SHARES = {True: 0.25, False: 2.0 / 3.0}
+"""Shares of the guesses in a plane, and of the others, that wind, where elements resolve that."""
+FLATTER = 1.0 / 3.0
+"""Waves of guesses that wind, relative to those of the others."""
+LESS = 1.8
+"""Windings of guesses over those that evenly bent elements resolve: states undo a part of them."""
+GUESSES = 2.5
+"""Guesses for each start of a search, where some wind."""
+WINDING = 4.0 * np.pi
+"""Turn after which quaternions are what they were."""
+
+
+def most_windings(elements: int, degree: int, turn: float = WINDING) -> int:
+    """Windings, or turns by an angle, along so many elements that states may have."""
+    return int(LESS * elements * turn_of_element(degree, IN_SPACE.smallest) / turn)
+
+
+def are_wound(planar: Flags, generator: np.random.Generator) -> Flags:
+    """Which guesses wind: different shares of those in a plane, and of the others."""
+    share = np.where(planar, SHARES[True], SHARES[False])
+    return np.asarray(generator.uniform(size=len(planar)) < share)
+
+
+def random_windings(most: int, planar: Flags, generator: np.random.Generator) -> Numbers:
+    """Number of windings of guesses, up to `most` either way, and 0 of those that are not wound."""
+    if most == 0:
+        return np.zeros(len(planar), int)
+    size, sign = (
+        generator.integers(1, most + 1, size=len(planar)),
+        generator.choice([-1, 1], len(planar)),
+    )
+    return np.asarray(size * sign * are_wound(planar, generator))
+
+
+def random_axes(lanes: int, generator: np.random.Generator) -> Float[np.ndarray, "lanes 3"]:
+    """Unit vectors in all directions alike."""
+    vectors = generator.normal(size=(lanes, 3))
+    return np.asarray(vectors / np.linalg.norm(vectors, axis=1, keepdims=True))
