@@ -47,9 +47,10 @@ CROWDED = 0.01
 random pushes step over."""
 FIRM = 100.0
 """Force of a push along a soft mode, over stiffness times length of the mode."""
-HOMOTOPIES = 0.25
-"""Share of the guesses from which Newton homotopy starts as well: it leads to other states, where
-Newton's method leaves what guesses are near."""
+HOMOTOPIES, AS_WELL = 0.05, 0.25
+"""Shares of the guesses from which Newton homotopy starts: where Newton found nothing, and in any
+case, where a structure has several guesses for each start. It leads to other states: Newton's
+method leaves what guesses are near."""
 MEANS = 3
 """Known states of which guesses between them are means."""
 ITERATIONS, WAY = 30, 7.0
@@ -157,8 +158,9 @@ class Pools:
         found = near.found
         self.failures.append(("Newton did not converge", group[~found]))
         led = self._take(near.z[found], group[found])
-        some = np.ceil(HOMOTOPIES * guesses)
-        again = (number >= guesses - some) | (~found & (number < some))  # the first are special
+        as_well = AS_WELL if structure.guesses_per_start > 1.0 else 0.0
+        again = (number < np.ceil(HOMOTOPIES * guesses)) & ~found  # the first ones are special
+        again |= number >= guesses - np.ceil(as_well * guesses)
         self._by_homotopy(guess[again & found], group[again & found])
         followed = self._by_homotopy(guess[again & ~found], group[again & ~found])
         self.starts, self.arrived = group, np.concatenate([led, followed])

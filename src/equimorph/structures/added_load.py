@@ -173,6 +173,11 @@ class Pushed(Structure):
         """Guesses of the structure."""
         return self._base.sample(self._own(p), generator)
 
+    @property
+    def guesses_per_start(self) -> float:
+        """Those of the structure."""
+        return self._base.guesses_per_start
+
     def special_guesses(self, p: Parameters) -> Float[np.ndarray, "guesses lanes size"]:
         """Guesses of the structure to which random ones rarely lead."""
         return self._base.special_guesses(self._own(p))

@@ -14,7 +14,7 @@ from equimorph.structures.frame.any_model import AnyFrameModel
 from equimorph.structures.frame.statics import NOTHING, Pivots, SpaceFlows, SpaceStatics
 from equimorph.structures.space_frame.network import SpatialNetwork, Turning
 from equimorph.structures.spatial.quaternions import exponential, matrices
-from equimorph.structures.spatial.windings import WINDING, most_windings
+from equimorph.structures.spatial.windings import most_half_windings
 
 LENGTH_STIFFNESS = 4000.0
 """Stiffness of the lengths of quaternions in the metric, in units of bending: margins are known
@@ -76,7 +76,7 @@ class SpatialFrameModel(AnyFrameModel):
     @cached_property
     def most_half_windings(self) -> int:
         """Turns by 2π along each piece of a member that states may have."""
-        return most_windings(self.mesh.elements, self.mesh.degree, 0.5 * WINDING)
+        return most_half_windings(self.mesh.elements, self.mesh.degree)
 
     # --- numbering ------------------------------------------------------------------------------
 

@@ -13,17 +13,23 @@ SHARES = {True: 0.25, False: 2.0 / 3.0}
 """Shares of the guesses in a plane, and of the others, that wind, where elements resolve that."""
 FLATTER = 1.0 / 3.0
 """Waves of guesses that wind, relative to those of the others."""
-LESS = 1.8
-"""Windings of guesses over those that evenly bent elements resolve: states undo a part of them."""
+WHOLE, HALF = 1.8, 1.2
+"""Most windings of rods, and half windings of members, over those of evenly bent elements: twist is
+resolved beyond, and states undo a part."""
 GUESSES = 2.5
 """Guesses for each start of a search, where some wind."""
 WINDING = 4.0 * np.pi
 """Turn after which quaternions are what they were."""
 
 
-def most_windings(elements: int, degree: int, turn: float = WINDING) -> int:
-    """Windings, or turns by an angle, along so many elements that states may have."""
-    return int(LESS * elements * turn_of_element(degree, IN_SPACE.smallest) / turn)
+def most_windings(elements: int, degree: int) -> int:
+    """Windings along so many elements that states of a rod may have."""
+    return int(WHOLE * elements * turn_of_element(degree, IN_SPACE.smallest) / WINDING)
+
+
+def most_half_windings(elements: int, degree: int) -> int:
+    """Turns by 2π along so many elements that states of a frame may have."""
+    return int(HALF * elements * turn_of_element(degree, IN_SPACE.smallest) / (0.5 * WINDING))
 
 
 def are_wound(planar: Flags, generator: np.random.Generator) -> Flags:
