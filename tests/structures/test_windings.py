@@ -36,7 +36,7 @@ def wound_in_plane(at: dict[str, float]) -> list[float]:
 
 @pytest.mark.parametrize(("lateral", "at", "states", "seed"), ARCHES)
 def test_states_of_planar_rods_that_wind_are_found_in_space(lateral, at, states, seed):
-    """Without windings 33 or 28, and 11 or 18 states; in two searches not all of those in a plane."""
+    """Without windings 33 or 28, and 11 or 18 states; twice not all of those in a plane."""
     rod = em.SpatialRod(torsion=0.77, lateral=lateral).resolving(BOUND)
     found = em.find_equilibria(rod, at, within=[rod.max_curvature <= BOUND], seed=seed)
     in_plane = wound_in_plane(at)
