@@ -13,7 +13,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from equimorph.manifold import equilibrium_set
 from equimorph.manifold.geometry.simplices import volumes
 from soak_sets import Question, compile_kernels, question
 
@@ -35,14 +34,7 @@ class Lifted:
 def lifted(asked: Question, seed: int) -> Lifted:
     """Lift a set and measure it."""
     start = time.process_time()
-    eset = equilibrium_set(
-        asked.structure,
-        asked.box,
-        fixed=asked.fixed,
-        within=list(asked.within),
-        intervals=asked.intervals,
-        seed=seed,
-    )
+    eset = asked.lifted(seed)
     sizes = np.abs(volumes(eset.coordinates[eset.cells]))
     sizes = sizes / np.prod(asked.box.upper - asked.box.lower)
     stable = sizes[eset.cell_index == 0].sum()

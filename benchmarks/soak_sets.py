@@ -33,8 +33,8 @@ sys.path.insert(0, str(ROOT / "tests"))
 
 from equimorph.errors import InputError  # noqa: E402  # after the path of the specimens
 from equimorph.linalg.compile_ahead import calls_of  # noqa: E402
-from equimorph.manifold import equilibrium_set  # noqa: E402
-from equimorph.model import Box, Constraint, Descriptor, Silent  # noqa: E402
+from equimorph.manifold import EquilibriumSet, equilibrium_set  # noqa: E402
+from equimorph.model import Box, Constraint, Descriptor, Progress, Silent  # noqa: E402
 from equimorph.structures import (  # noqa: E402
     Frame,
     Rod,
@@ -108,6 +108,18 @@ class Question:
     fixed: dict[str, float]
     within: tuple[Constraint, ...]
     intervals: tuple[int, ...]
+
+    def lifted(self, seed: int = 0, progress: Progress | None = None) -> EquilibriumSet:
+        """The set."""
+        return equilibrium_set(
+            self.structure,
+            self.box,
+            fixed=self.fixed,
+            within=list(self.within),
+            intervals=self.intervals,
+            seed=seed,
+            progress=progress,
+        )
 
     def __str__(self) -> str:
         sides = ", ".join(
@@ -221,14 +233,7 @@ def question(number: int) -> Question:
 def outcome(asked: Question) -> tuple[str, int]:
     """Whether a set is clean, or what fails; and its vertices."""
     try:
-        eset = equilibrium_set(
-            asked.structure,
-            asked.box,
-            fixed=asked.fixed,
-            within=list(asked.within),
-            intervals=asked.intervals,
-            progress=Deadline(),
-        )
+        eset = asked.lifted(progress=Deadline())
     except InputError as error:
         return f"refused: {error}", 0
     except OutOfTimeError as error:

@@ -30,12 +30,10 @@ from equimorph.model import (
     remember_call,
 )
 from equimorph.model.obstacle import straight_arcs
+from equimorph.structures.guesses import many_if_cheap
 from equimorph.structures.material_points import Inertial
 from equimorph.structures.whole_turns import WholeTurns
 from equimorph.tables import html_table
-
-CHEAP, MOST_CHEAP = 50.0, 5.0
-"""Unknowns below which more random guesses are made, and the most for each start."""
 
 
 @dataclass(frozen=True)
@@ -223,12 +221,8 @@ class Structure(Rebuilt, Inertial):
 
     @property
     def guesses_per_start(self) -> float:
-        """Random guesses for each start of a search: more where they cost little, or differ much.
-
-        By default as many as cost what one costs of a structure with fifty unknowns. See
-        docs/decisions.md, "Cheap guesses are many".
-        """
-        return min(max(CHEAP / self.size, 1.0), MOST_CHEAP)
+        """Random guesses for each start of a search, by default by their cost: `many_if_cheap`."""
+        return many_if_cheap(self.size)
 
     def special_guesses(self, p: Parameters) -> Float[np.ndarray, "guesses lanes size"]:
         """Guesses to which random ones rarely lead, several per lane; by default there are none."""

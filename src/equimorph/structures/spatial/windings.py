@@ -9,7 +9,7 @@ import numpy as np
 from equimorph.arrays import Flags, Float, Numbers
 from equimorph.structures.resolution import IN_SPACE, turn_of_element
 
-SHARES = {True: 0.25, False: 2.0 / 3.0}
+IN_PLANE, BEYOND_PLANE = 0.25, 2.0 / 3.0
 """Shares of the guesses in a plane, and of the others, that wind, where elements resolve that."""
 FLATTER = 1.0 / 3.0
 """Waves of guesses that wind, relative to those of the others."""
@@ -34,7 +34,7 @@ def most_half_windings(elements: int, degree: int) -> int:
 
 def are_wound(planar: Flags, generator: np.random.Generator) -> Flags:
     """Which guesses wind: different shares of those in a plane, and of the others."""
-    share = np.where(planar, SHARES[True], SHARES[False])
+    share = np.where(planar, IN_PLANE, BEYOND_PLANE)
     return np.asarray(generator.uniform(size=len(planar)) < share)
 
 
@@ -42,10 +42,8 @@ def random_windings(most: int, planar: Flags, generator: np.random.Generator) ->
     """Number of windings of guesses, up to `most` either way, and 0 of those that are not wound."""
     if most == 0:
         return np.zeros(len(planar), int)
-    size, sign = (
-        generator.integers(1, most + 1, size=len(planar)),
-        generator.choice([-1, 1], len(planar)),
-    )
+    size = generator.integers(1, most + 1, size=len(planar))
+    sign = generator.choice([-1, 1], size=len(planar))
     return np.asarray(size * sign * are_wound(planar, generator))
 
 
